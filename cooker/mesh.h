@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The cooker's plain mesh. Metres, metres per second, counter-clockwise seen from the air.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace rill::cooker {
+
+using Triangle = std::array<uint32_t, 3>;
+
+struct Mesh {
+    std::vector<glm::vec3> positions;
+    std::vector<glm::vec3> normals;     ///< per vertex, unit; may be empty
+    std::vector<glm::vec3> velocities;  ///< per vertex; may be empty
+    std::vector<Triangle> triangles;
+};
+
+/// Bad input or output: names the file (and place) and the cause, one line. Becomes exit code 2.
+struct InputError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+/// Wrong use of the command line or of a setting. Becomes exit code 1.
+struct UsageError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/// Area-weighted vertex normals (unit; zero where no triangle gives one).
+std::vector<glm::vec3> vertex_normals(const Mesh& mesh);
+/// Median edge length over (at most 100k evenly strided) edges; 0 for an empty mesh.
+float median_edge(const Mesh& mesh);
+/// Signed volume, m³, positive for outward winding.
+double signed_volume(const Mesh& mesh);
+
+}  // namespace rill::cooker

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// One interface for every input format. A reader hands out frames in metres and metres per second,
+// in the source's own frame numbers and time, wound counter-clockwise seen from the air.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mesh.h"
+
+namespace rill::cooker {
+
+enum class VelocityMeaning {
+    none,      ///< the source has none
+    forward,   ///< carries frame k on to k + 1 (Mantaflow)
+    backward,  ///< brought the liquid to frame k (FLIP Fluids)
+    unknown,   ///< to be found out by advecting against both neighbours
+};
+struct SequenceInfo {
+    std::string format;            ///< "Mantaflow cache", "PLY sequence" …
+    std::string path;              ///< as given
+    std::vector<int> numbers;      ///< the source's frame numbers, ascending, evenly stepped
+    std::vector<double> seconds;   ///< time of each on the source's clock
+    double frames_per_second = 24;
+    VelocityMeaning velocity = VelocityMeaning::none;
+    uint64_t raw_bytes = 0;        ///< size of the source files read
+};
+struct ReadOptions {
+    double frames_per_second = 0;  ///< 0: what the source says, else 24
+    int first = 0, last = 0, step = 0;  ///< --frames A:B:S; step 0: all frames
+    std::string velocity_name;     ///< attribute; empty: names users know (see README)
+    bool velocity_per_frame = false;
+};
+
+class SequenceReader {
+public:
+    virtual ~SequenceReader() = default;
+    virtual const SequenceInfo& info() const = 0;
+    /// Frame `index` of info().numbers, checked: finite, indices in range; no triangles is legal.
+    /// Thread safe. Throws InputError naming file and cause.
+    virtual Mesh read(size_t index) const = 0;
+};
+
+/// Looks at the path and picks the reader. Throws InputError.
+std::unique_ptr<SequenceReader> open_sequence(const std::string& input, const ReadOptions& options);
+
+}  // namespace rill::cooker

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// The bytes of a .rill file: what is where, and the version table. runtime/FORMAT.md says the same
+// in words. Little endian, fixed width. Read through format/check.h, never by casting file memory.
+//
+//   Header | directory: FrameTime[] WindowRecord[] ChunkRecord[] model settings | chunk bytes …
+//
+// Chunks stand in playback order: window by window, coarse layers first, blocks within a layer.
+#pragma once
+#include <cstdint>
+
+namespace rill::format {
+
+inline constexpr uint8_t magic[8] = {'R', 'I', 'L', 'L', '\r', '\n', 0x1a, '\n'};
+
+/// Numbers are never reused. At or above 0xF0: in flux, refused by release builds of later versions.
+enum Version : uint32_t {
+    version_1 = 1,  ///< 2026-11: first
+    current_version = version_1,
+};
+
+/// Hard limits a valid file keeps; they bound what a hostile one can ask for.
+inline constexpr uint32_t max_layers = 8;
+inline constexpr uint32_t max_blocks = 256;        ///< per window
+inline constexpr uint32_t max_window_samples = 65; ///< samples (frames) a window touches
+inline constexpr uint32_t max_terms = 32;          ///< basis functions of one track channel
+inline constexpr uint32_t max_tracks_per_chunk = 1u << 20;
+inline constexpr uint32_t max_directory_bytes = 1u << 28;
+
+/// 128 bytes at offset 0.
+struct Header {
+    uint8_t magic[8];
+    uint32_t version;
+    uint32_t header_bytes;      ///< 128
+    uint64_t file_bytes;        ///< of the whole file
+    uint64_t content_hash;      ///< FNV-1a 64 over the chunk checksums in file order
+    uint32_t directory_bytes;   ///< directly after the header
+    uint32_t directory_crc;     ///< CRC-32 of the directory bytes
+    uint32_t frame_count;       ///< ≥ 1
+    int32_t first_frame;        ///< the source's number of frame 0
+    int32_t frame_step;         ///< source numbers advance by this, ≥ 1
+    uint32_t window_count;
+    uint32_t chunk_count;
+    uint32_t layer_count;       ///< 1 … max_layers
+    uint32_t frame_time_count;  ///< 0: evenly spaced at frames_per_second; else = frame_count
+    uint32_t model_bytes;       ///< initial contexts of the entropy coder
+    uint32_t settings_bytes;    ///< UTF-8 JSON
+    float cell_size;            ///< median edge of the source, metres, > 0
+    double frames_per_second;   ///< > 0
+    double first_seconds;       ///< source's clock at frame 0
+    float lower[3];             ///< bounds of the source over all frames; equal to upper if empty
+    float upper[3];
+    uint32_t reserved;          ///< 0
+    uint32_t header_crc;        ///< CRC-32 of the 124 bytes before it
+};
+inline constexpr uint32_t header_bytes = 128;
+static_assert(sizeof(Header) == header_bytes, "the struct is the byte layout");
+
+/// One span of time, decodable alone: frames first_sample … first_sample + sample_count − 1.
+/// Neighbouring windows share their border frame (the last sample of one = the first of the next).
+struct WindowRecord {           // 24 bytes
+    uint32_t first_sample;      ///< index of a frame, 0 … frame_count−1
+    uint32_t sample_count;      ///< 1 … max_window_samples
+    uint32_t first_chunk;       ///< into the chunk table
+    uint32_t chunk_count;       ///< may be 0: no surface at all in this span
+    uint32_t block_count;
+    uint32_t reserved;          ///< 0
+};
+
+/// One (window, layer, block). Chunks of a window are sorted by layer, then block.
+struct ChunkRecord {            // 72 bytes
+    uint64_t offset;            ///< from the start of the file
+    uint32_t bytes;
+    uint32_t crc;               ///< CRC-32 of the chunk bytes
+    uint16_t layer;
+    uint16_t block;
+    uint32_t point_count;       ///< surface-point tracks in it
+    uint32_t drop_count;        ///< drop tracks in it
+    uint32_t coefficient_count; ///< floats after decoding (format/tracks.h), points and drops
+    float lower[3], upper[3];   ///< bounds of the surface these tracks carry, over the whole window
+    float spacing;              ///< typical distance between neighbouring points, this and coarser layers
+    float error_mean;           ///< measured with this layer and all coarser ones, metres, window mean
+    float error_p99;            ///< likewise the 99th percentile
+    uint32_t reserved;          ///< 0
+};
+inline constexpr uint32_t window_record_bytes = 24;
+inline constexpr uint32_t chunk_record_bytes = 72;
+static_assert(sizeof(WindowRecord) == window_record_bytes && sizeof(ChunkRecord) == chunk_record_bytes,
+              "the structs are the byte layout");
+
+}  // namespace rill::format

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// What a decoded chunk is: tracks as Fourier-extension coefficients, ready for evaluation.
+// Shared by the cooker (which encodes it) and the runtime (which decodes and evaluates it).
+//
+// A *point track* is a surface point (position + unit normal) over part of a window.
+// A *drop track* is a small closed component: an ellipsoid (centre + symmetric shape matrix S),
+// surface = { centre + S u : |u| = 1 }. It costs one track where points would need a dozen.
+//
+// Time inside a window is measured in samples: s = 0 is its first frame, s = sample_count − 1 its
+// last. A track lives on the closed range [birth, death] of samples. Its channels are
+//     c(s) = Σ_k coefficient[k] · φ_k(s − birth),  k < terms,
+// φ_k the orthonormal Fourier-extension basis of length death − birth + 1 (fourier_extension.h).
+// A track that is born (not carried over the window's border) is also active on (birth − 1, birth),
+// one that dies on (death, death + 1): there it moves along the tangent of its end and its
+// activity ramps linearly between 0 and 1. Elsewhere activity is 1; outside, the track is absent.
+#pragma once
+#include <cstdint>
+
+namespace rill::format {
+
+enum TrackFlags : uint8_t {
+    track_born = 1,   ///< begins here; not set = continues from the previous window (or clip start)
+    track_dies = 2,   ///< ends here; not set = lives on in the next window (or clip end)
+    track_cosine = 4, ///< basis is the plain cosine (DCT-II) one, for rough motion; else Fourier ext.
+};
+
+/// Position (3 channels, metres, asset space, relative to TrackBlock::origin) then
+/// normal (3 channels, not unit: normalise after evaluation) or, for a drop, shape
+/// (6 channels: xx yy zz xy xz yz, metres).
+struct Track {
+    uint32_t first_coefficient;  ///< into TrackBlock::coefficients
+    uint8_t birth, death, flags;
+    uint8_t position_terms;      ///< 1 … life length; coefficients stored [term][channel]
+    uint8_t second_terms;        ///< normal or shape; stored after the position's, [term][channel]
+    uint8_t reserved[3];
+};
+static_assert(sizeof(Track) == 12);
+
+/// Memory belongs to whoever made it; decoding fills it, evaluation reads it.
+struct TrackBlock {
+    float origin[3];        ///< added to positions
+    uint32_t point_count;   ///< tracks [0, point_count) are points
+    uint32_t drop_count;    ///< tracks [point_count, point_count + drop_count) are drops
+    uint32_t coefficient_count;
+    Track* tracks;
+    float* coefficients;
+};
+
+/// Points and drops at one moment, as structure of arrays. Asset space, metres, metres per second.
+/// Capacity is the caller's business; see evaluate_tracks().
+struct PointSet {
+    uint32_t count;
+    float *x, *y, *z;
+    float *nx, *ny, *nz;    ///< unit
+    float *vx, *vy, *vz;    ///< velocity of the point
+    float* activity;        ///< (0, 1]: fading in or out
+};
+struct DropSet {
+    uint32_t count;
+    float *x, *y, *z;
+    float* shape[6];        ///< xx yy zz xy xz yz
+    float *vx, *vy, *vz;
+    float* activity;
+};
+
+}  // namespace rill::format

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Coefficients at a time → points and drops with exact velocity.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "format/fourier_extension.h"
+#include "format/tracks.h"
+
+namespace rill {
+
+/// Basis rows at one moment of one window, shared by all its tracks: computed once per frame.
+struct TimeRows;
+size_t time_rows_bytes(uint32_t sample_count) noexcept;
+/// s: samples since the window's first, 0 … sample_count − 1. samples_per_second: ds/dt at s, which
+/// turns derivatives into metres per second.
+TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count,
+                          double s, double samples_per_second) noexcept;
+
+/// Appends the tracks [first, last) of the block that are active at the rows' time to points/drops.
+/// `capacity`: of each set. Returns how many were active (appended + those that did not fit).
+uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, uint32_t first,
+                         uint32_t last, uint32_t point_capacity, uint32_t drop_capacity,
+                         format::PointSet& points, format::DropSet& drops) noexcept;
+
+}  // namespace rill

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Field → closed triangle mesh: dual contouring (Ju, Losasso, Schaefer & Warren 2002) marched from
+// the decoded points (Keeler & Bridson, section 1), one manifold vertex per surface patch of a cell.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "relay.h"
+#include "rill/rill.h"
+#include "surface/field.h"
+
+namespace rill {
+
+struct MeshLimits {
+    uint32_t vertices, indices;  ///< scratch capacity, all workers together
+    uint32_t tiles;              ///< 0: derived from vertices
+    uint32_t workers;
+};
+struct FrustumPlanes {
+    float planes[6][4];  ///< asset space, inward
+};
+struct MeshInput {
+    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares
+    float cell_size;              ///< asset space
+    const FrustumPlanes* views;   ///< none: everything
+    uint32_t view_count;
+    bool velocity;                ///< wanted in the output
+    Target* target;               ///< may be null: mesh but write nothing
+};
+struct MeshCounts {
+    uint32_t cut;                 ///< Cut bits
+    uint32_t vertices_wanted, indices_wanted;
+    uint32_t ranges_wanted, corners_evaluated;
+};
+struct Mesher;  ///< lives in the memory given
+
+size_t mesher_bytes(const MeshLimits& limits) noexcept;
+Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept;
+/// Sets the work; then run mesh_stages() with the Mesher as context. Afterwards target's *_used are set.
+void begin_mesh(Mesher* mesher, const MeshInput& input) noexcept;
+const Stage* mesh_stages(uint32_t* count) noexcept;
+MeshCounts mesh_counts(const Mesher* mesher) noexcept;
+
+}  // namespace rill

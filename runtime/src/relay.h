@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// Chains the stages of a frame over the caller's Jobs: the last task of a stage starts the next one,
+// so nothing waits between stages. The only wait of the runtime is in end_frame().
+#pragma once
+#include <cstdint>
+
+#include "rill/rill.h"
+
+namespace rill {
+
+/// One stage of a frame. prepare() runs alone and says how many tasks the stage has; run() is then
+/// called once per index, in any order, on any worker. When `repeats` is set prepare() is called again
+/// after each round until it answers 0 (marching rounds).
+struct Stage {
+    uint32_t (*prepare)(void* context);
+    void (*run)(void* context, uint32_t index, uint32_t worker);  ///< may be null: serial only
+    bool repeats;
+};
+
+/// Runs the stages in order on this thread: tools, tests, and Jobs without submit.
+inline void run_inline(const Stage* stages, uint32_t count, void* context) {
+    for (uint32_t s = 0; s < count; ++s) {
+        for (;;) {
+            const uint32_t tasks = stages[s].prepare(context);
+            for (uint32_t i = 0; i < tasks && stages[s].run; ++i) stages[s].run(context, i, 0);
+            if (tasks == 0 || !stages[s].repeats) break;
+        }
+    }
+}
+
+}  // namespace rill

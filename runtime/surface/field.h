@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// The surface that a set of points and drops means: neighbour grid, local quadratics, blended
+// implicit function. This definition binds cooker and runtime alike: the cooker places points so
+// that THIS function fits the source.
+//
+// Method: Keeler & Bridson, "Compact Iso-Surface Representation and Compression for Fluid
+// Phenomena", section 2: Γ_i(x) = d + n·r + a τ1² + b τ1 τ2 + c τ2² (eq. 1), a, b, c by minimal-norm
+// least squares over neighbours (eq. 2), blended with compact weights. Measured departures from
+// the paper stand in field.cpp.
+//
+// Sign: negative in the liquid, positive in the air; about a distance (metres) near the surface.
+// Everything is a pure function of (points, drops, x): no order, thread or tile changes a bit.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "format/tracks.h"
+
+namespace rill::surface {
+
+/// Axis-aligned box, asset space.
+struct Box {
+    float lower[3], upper[3];
+};
+
+/// All memory is the caller's: one block of field_bytes(), 64-byte aligned.
+struct Field {
+    // Points sorted by grid cell (ties by input index), and their local quadratics.
+    uint32_t point_count, drop_count;
+    float *x, *y, *z;                      ///< position
+    float *nx, *ny, *nz;                   ///< normal of the patch (unit)
+    float *qxx, *qyy, *qzz, *qxy, *qxz, *qyz;  ///< Γ = d + n·r + rᵀQr, Q acts in the tangent plane
+    float* support;                        ///< radius R_i beyond which the patch has no weight
+    float* activity;
+    float *vx, *vy, *vz;
+    float* bend;                           ///< distance at which Γ_i is made linear (wild curvature)
+    uint32_t* source;                      ///< index in the PointSet each came from
+    // Drops as they came, with inverse shape and mean radius.
+    float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
+    // Hashed uniform grid over the points.
+    uint32_t bucket_count;                 ///< power of two
+    uint32_t* bucket_start;                ///< bucket_count + 1
+    float grid_cell, largest_support, largest_reach;
+    float lower[3], upper[3];              ///< of everything with weight
+    struct Scratch* scratch;               ///< used while building only
+};
+
+/// Bytes that a field of at most so many points and drops needs.
+size_t field_bytes(uint32_t points, uint32_t drops) noexcept;
+
+/// Step 1, one thread: sorts the points into the grid inside `memory`. Non-finite points are
+/// dropped. O(n).
+void begin_field(Field& field, void* memory, const format::PointSet& points,
+                 const format::DropSet& drops) noexcept;
+/// Step 2, any threads, disjoint ranges [first, last) of sorted points: supports and quadratics.
+void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
+/// Step 3, one thread: largest support, bounds.
+void finish_field(Field& field) noexcept;
+
+/// Patches and drops whose weight can be non-zero somewhere in the box, ascending; drops are numbered
+/// from field.point_count on. Returns how many there are; writes at most `capacity` of them (when the
+/// return is larger, the list is the first `capacity` and evaluation stays deterministic).
+uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capacity) noexcept;
+
+/// Field values at n positions, from candidates that gather() gave for a box holding them all.
+/// Where nothing has weight the value is +unsupported.
+inline constexpr float unsupported = 1e30f;
+void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
+              const float* x, const float* y, const float* z, uint32_t n, float* value) noexcept;
+/// The same with gradient (not normalised) and, if velocity is not null, the blended velocity of the
+/// surface (3n floats, SoA in three rows of n).
+void evaluate_gradient(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
+                       const float* x, const float* y, const float* z, uint32_t n, float* value,
+                       float* gx, float* gy, float* gz, float* velocity) noexcept;
+
+}  // namespace rill::surface
