@@ -39,9 +39,20 @@ struct DirectedDistance {
     double mean = 0, p99 = 0, max = 0;   ///< metres, area-weighted
     double normal_degrees = 0;           ///< area-weighted mean angle between vertex normals
 };
+/// How much area lies at which distance, in steps of 1/16 octave: frames add up to a sequence without
+/// keeping their samples.
+struct DistanceHistogram {
+    std::vector<double> area;  ///< by distance; empty = nothing yet
+    void add(float distance, double weight);
+    void add(const DistanceHistogram& other);
+    /// The distance that the share `q` of the area keeps below, within 1 %; 0 when empty.
+    double quantile(double q) const;
+    static float distance_of(size_t bin);  ///< lower end of a bin, metres
+};
 struct SurfaceDistance {
     DirectedDistance forward, backward;  ///< source → decoded, decoded → source
     double mean = 0, p99 = 0, max = 0, normal_degrees = 0;  ///< symmetric: both sample sets pooled
+    DistanceHistogram histogram;         ///< both sample sets
     std::vector<float> per_source_vertex;  ///< unsigned distance, only if asked for
 };
 /// Samples: every vertex and every triangle centroid of each side, weighted by the area it stands for.

@@ -2,6 +2,7 @@
 // One interface for every input format. A reader hands out frames in metres and metres per second,
 // in the source's own frame numbers and time, wound counter-clockwise seen from the air.
 #pragma once
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,6 +31,9 @@ struct ReadOptions {
     int first = 0, last = 0, step = 0;  ///< --frames A:B:S; step 0: all frames
     std::string velocity_name;     ///< attribute; empty: names users know (see README)
     bool velocity_per_frame = false;
+    bool require_velocity = false; ///< a source without velocity is an InputError, already on opening
+    /// Told in one line what was put right or guessed; may be called from several threads, one at a time.
+    std::function<void(const std::string&)> warn;
 };
 
 class SequenceReader {
@@ -39,6 +43,8 @@ public:
     /// Frame `index` of info().numbers, checked: finite, indices in range; no triangles is legal.
     /// Thread safe. Throws InputError naming file and cause.
     virtual Mesh read(size_t index) const = 0;
+    /// What messages call frame `index`: its file.
+    virtual std::string name(size_t index) const = 0;
 };
 
 /// Looks at the path and picks the reader. Throws InputError.

@@ -12,8 +12,9 @@
 namespace rill {
 
 struct MeshLimits {
-    uint32_t vertices, indices;  ///< scratch capacity, all workers together
-    uint32_t tiles;              ///< 0: derived from vertices
+    uint32_t vertices;           ///< scratch capacity, all workers together
+    uint32_t indices;            ///< not used: indices need no scratch, they go straight to the target
+    uint32_t tiles;              ///< of 8³ cells; 0: derived from vertices
     uint32_t workers;
 };
 struct FrustumPlanes {
@@ -29,7 +30,7 @@ struct MeshInput {
 };
 struct MeshCounts {
     uint32_t cut;                 ///< Cut bits
-    uint32_t vertices_wanted, indices_wanted;
+    uint32_t vertices_wanted, indices_wanted;  ///< when tiles ran out: twice MeshLimits::vertices at least
     uint32_t ranges_wanted, corners_evaluated;
 };
 struct Mesher;  ///< lives in the memory given

@@ -2,6 +2,7 @@
 // Chains the stages of a frame over the caller's Jobs: the last task of a stage starts the next one,
 // so nothing waits between stages. The only wait of the runtime is in end_frame().
 #pragma once
+#include <atomic>
 #include <cstdint>
 
 #include "rill/rill.h"
@@ -27,5 +28,35 @@ inline void run_inline(const Stage* stages, uint32_t count, void* context) {
         }
     }
 }
+
+/// The stages of one frame and how far they are. add() all, then start() once; reusable when done.
+struct Relay {
+    static constexpr uint32_t most_steps = 32;
+
+    /// Forgets the last frame's stages.
+    void clear(const Jobs& over) noexcept;
+    void add(const Stage* stages, uint32_t count, void* context) noexcept;
+    /// Returns at once; the stages run as jobs. Needs Jobs::submit.
+    void start() noexcept;
+    /// Everything here and now.
+    void run_all() noexcept;
+    /// Everything the stages wrote is visible once this is true, and no task touches the relay any more.
+    bool done() const noexcept { return done_.load(std::memory_order_acquire); }
+
+private:
+    struct Step {
+        Stage stage;
+        void* context;
+    };
+    void advance(uint32_t worker) noexcept;
+    static void run_task(void* relay, uint32_t index, uint32_t worker);
+
+    Step steps_[most_steps];
+    Step running_{};  ///< of the tasks that are out
+    uint32_t step_count_ = 0, current_ = 0;
+    Jobs jobs_{};
+    std::atomic<uint32_t> tasks_left_{0};
+    std::atomic<bool> done_{true};
+};
 
 }  // namespace rill

@@ -33,16 +33,15 @@ struct Field {
     float* support;                        ///< radius R_i beyond which the patch has no weight
     float* activity;
     float *vx, *vy, *vz;
-    float* bend;                           ///< distance at which Γ_i is made linear (wild curvature)
     uint32_t* source;                      ///< index in the PointSet each came from
     // Drops as they came, with inverse shape and mean radius.
     float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
-    // Hashed uniform grid over the points.
-    uint32_t bucket_count;                 ///< power of two
-    uint32_t* bucket_start;                ///< bucket_count + 1
-    float grid_cell, largest_support, largest_reach;
+    // Dense uniform grid over the points: cell c holds sorted points [cell_start[c], cell_start[c+1]).
+    uint32_t* cell_start;
+    uint32_t grid_size[3];
+    float grid_origin[3], grid_cell;
+    float largest_support, largest_reach;  ///< over points; over drops
     float lower[3], upper[3];              ///< of everything with weight
-    struct Scratch* scratch;               ///< used while building only
 };
 
 /// Bytes that a field of at most so many points and drops needs.
@@ -63,7 +62,7 @@ void finish_field(Field& field) noexcept;
 uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capacity) noexcept;
 
 /// Field values at n positions, from candidates that gather() gave for a box holding them all.
-/// Where nothing has weight the value is +unsupported.
+/// Where no patch has weight the plane of the nearest point decides; where none is near: +unsupported.
 inline constexpr float unsupported = 1e30f;
 void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
               const float* x, const float* y, const float* z, uint32_t n, float* value) noexcept;

@@ -186,7 +186,9 @@ struct Stats {
     uint32_t cut;  ///< Cut bits
     uint32_t blocks_in_view, blocks_drawn, layers_wanted, layers_drawn;
     uint32_t points_wanted, points_used, vertices_wanted, indices_wanted;
-    uint32_t chunks_resident, chunks_late, chunks_rejected, reads_in_flight, reads_refused;
+    uint32_t chunks_resident, chunks_late;  ///< now; late: wanted for this moment and not there
+    uint32_t reads_in_flight;
+    uint32_t chunks_rejected, reads_refused, reads_failed;  ///< since create()
     uint64_t bytes_resident, bytes_asked, bytes_arrived;  ///< asked/arrived: since create()
     uint32_t windows_decoded;                             ///< since create()
     uint32_t plan_us, decode_us, field_us, mesh_us, wait_us;  ///< 0 unless Budget::microseconds

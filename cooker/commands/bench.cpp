@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <thread>
+
+#include "asset_directory.h"
+#include "commands/bench_player.h"
+#include "commands/commands.h"
+#include "draco_mesh.h"
+
+namespace rill::cooker {
+namespace {
+
+struct BenchOptions {
+    std::string asset, frames, json;
+    int jobs = 0;
+    bool quiet = false;
+};
+
+/// One way through the clip.
+struct Pass {
+    std::string name;
+    int jobs = 1;
+    std::vector<BenchFrame> frames;
+    uint64_t frame_allocations = 0;
+    uint64_t hash = 0;  // over the frames in clip order, so that passes can be compared
+
+    uint32_t percentile(Stage stage, double q) const {
+        std::vector<uint32_t> times;
+        for (const BenchFrame& f : frames) times.push_back(f.microseconds[stage]);
+        std::sort(times.begin(), times.end());
+        return times.empty() ? 0 : times[std::min(times.size() - 1, size_t(q * double(times.size())))];
+    }
+    double mean(Stage stage) const {
+        double sum = 0;
+        for (const BenchFrame& f : frames) sum += f.microseconds[stage];
+        return frames.empty() ? 0 : sum / double(frames.size());
+    }
+    double triangles_per_second() const {
+        double triangles = 0, time = 0;
+        for (const BenchFrame& f : frames) triangles += f.triangles, time += f.microseconds[stage_total];
+        return time > 0 ? triangles / time * 1e6 : 0;
+    }
+};
+
+/// `order` holds places in `frames`, which holds frame indices.
+Pass run_pass(BenchPlayer& player, const std::string& name, int jobs, const std::vector<uint32_t>& frames,
+              const std::vector<size_t>& order, float rate) {
+    Pass pass{name, jobs, {}, 0, 14695981039346656037u};
+    std::vector<uint64_t> hashes(frames.size());
+    const uint64_t before = player.allocations();
+    for (size_t i : order) {
+        pass.frames.push_back(player.play(player.seconds_of(frames[i]), rate));
+        hashes[i] = pass.frames.back().hash;
+    }
+    pass.frame_allocations = player.allocations() - before;
+    for (uint64_t h : hashes) pass.hash = (pass.hash ^ h) * 1099511628211u;
+    return pass;
+}
+
+std::vector<size_t> forward(size_t count) {
+    std::vector<size_t> order(count);
+    for (size_t i = 0; i < count; ++i) order[i] = i;
+    return order;
+}
+/// The same shuffle everywhere.
+std::vector<size_t> jumps(size_t count) {
+    std::vector<size_t> order = forward(count);
+    uint64_t state = 88172645463325252u;
+    for (size_t i = count; i > 1; --i) {
+        state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+        std::swap(order[i - 1], order[state % i]);
+    }
+    return order;
+}
+
+nlohmann::json to_json(const Pass& pass) {
+    nlohmann::json stages;
+    for (int s = 0; s < stage_count; ++s)
+        stages[stage_names[s]] = {{"mean_us", pass.mean(Stage(s))},
+                                  {"p50_us", pass.percentile(Stage(s), 0.5)},
+                                  {"p99_us", pass.percentile(Stage(s), 0.99)},
+                                  {"max_us", pass.percentile(Stage(s), 1)}};
+    uint64_t triangles = 0, points = 0;
+    uint32_t cut = 0;
+    for (const BenchFrame& f : pass.frames) triangles += f.triangles, points += f.points, cut |= f.cut;
+    char hash[17];
+    std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(pass.hash));
+    const double frames = std::max<double>(1, double(pass.frames.size()));
+    return {{"name", pass.name},
+            {"jobs", pass.jobs},
+            {"frames", pass.frames.size()},
+            {"stages", stages},
+            {"triangles_per_second", pass.triangles_per_second()},
+            {"triangles_per_frame", double(triangles) / frames},
+            {"points_per_frame", double(points) / frames},
+            {"allocations_in_frames", pass.frame_allocations},
+            {"cut", cut},
+            {"output_hash", hash}};
+}
+
+void print(const Pass& pass) {
+    std::printf("%-9s %4d ", pass.name.c_str(), pass.jobs);
+    for (int s = 0; s < stage_count; ++s) std::printf(" %7.0f", pass.mean(Stage(s)));
+    std::printf("   %7u %7u %7u  %6.2f  %llu  %016llx\n", pass.percentile(stage_total, 0.5), pass.percentile(stage_total, 0.99),
+                pass.percentile(stage_total, 1), pass.triangles_per_second() / 1e6, static_cast<unsigned long long>(pass.frame_allocations),
+                static_cast<unsigned long long>(pass.hash));
+}
+
+/// Draco's decoder on what Rill itself shows, on one core as well: triangles per second.
+struct DracoRate {
+    double triangles = 0, seconds = 0, bytes = 0;
+    size_t frames = 0;
+};
+DracoRate draco_rate(BenchPlayer& player, const std::vector<uint32_t>& frames) {
+    constexpr size_t most = 16;
+    DracoRate rate;
+    const size_t count = std::min(most, frames.size());
+    for (size_t k = 0; k < count; ++k) {
+        Mesh mesh;
+        player.play(player.seconds_of(frames[frames.size() * k / count]), 0, &mesh);
+        if (mesh.triangles.empty()) continue;
+        const std::string bytes = draco_encode(mesh, 10);
+        const auto start = std::chrono::steady_clock::now();
+        const Mesh decoded = draco_decode(bytes, "Draco");
+        rate.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        rate.triangles += double(decoded.triangles.size()), rate.bytes += double(bytes.size()), ++rate.frames;
+    }
+    return rate;
+}
+
+std::vector<uint32_t> frames_asked_for(const AssetDirectory& directory, const BenchOptions& options) {
+    const FrameRange range = parse_frames(options.frames);
+    std::vector<uint32_t> frames;
+    for (uint32_t i = 0; i < directory.header.frame_count; ++i) {
+        const int number = directory.frame_number(i);
+        if (!range.step || (number >= range.first && number <= range.last && (number - range.first) % range.step == 0)) frames.push_back(i);
+    }
+    if (frames.empty()) throw InputError(options.asset + ": has none of the frames " + options.frames);
+    return frames;
+}
+
+int bench_command(const BenchOptions& options) {
+    const AssetDirectory directory = read_directory(options.asset);
+    const std::vector<uint32_t> frames = frames_asked_for(directory, options);
+    const int most_jobs = options.jobs > 0 ? options.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
+    std::vector<size_t> ahead = forward(frames.size()), back(ahead.rbegin(), ahead.rend());
+    std::vector<Pass> passes;
+    nlohmann::json memory;
+    DracoRate draco;
+    double file_bytes = double(directory.header.file_bytes), bytes_read = 0;
+    for (int jobs = 1; jobs <= most_jobs; ++jobs) {
+        BenchPlayer player(options.asset, jobs);
+        const uint64_t at_start = player.allocations();
+        passes.push_back(run_pass(player, "cold", jobs, frames, ahead, 1));
+        bytes_read = double(player.bytes_read());
+        passes.push_back(run_pass(player, "forward", jobs, frames, ahead, 1));
+        if (jobs > 1) continue;
+        passes.push_back(run_pass(player, "backward", jobs, frames, back, -1));
+        passes.push_back(run_pass(player, "jumps", jobs, frames, jumps(frames.size()), 0));
+        memory = {{"allocations_until_created", at_start}, {"peak_bytes", player.peak_bytes()}};
+        draco = draco_rate(player, frames);
+    }
+    bool same = true;
+    uint64_t frame_allocations = 0;
+    nlohmann::json list = nlohmann::json::array(), scaling = nlohmann::json::array();
+    for (const Pass& pass : passes) {
+        same = same && pass.hash == passes.front().hash;
+        frame_allocations += pass.frame_allocations;
+        list.push_back(to_json(pass));
+        if (pass.name == "forward")
+            scaling.push_back({{"jobs", pass.jobs},
+                               {"mean_us", pass.mean(stage_total)},
+                               {"speedup", pass.mean(stage_total) > 0 ? passes[1].mean(stage_total) / pass.mean(stage_total) : 0}});
+    }
+    const double rill_rate = passes[1].triangles_per_second(), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
+    const nlohmann::json json = {
+        {"report", "rill bench"},
+        {"version", 1},
+        {"asset", options.asset},
+        {"frames", frames.size()},
+        {"file_bytes", file_bytes},
+        {"bytes_read_cold", bytes_read},
+        {"memory", memory},
+        {"allocations_in_frames", frame_allocations},
+        {"output_identical", same},
+        {"passes", list},
+        {"scaling", scaling},
+        {"draco",
+         {{"bits", 10},
+          {"speed", 0},
+          {"frames", draco.frames},
+          {"triangles_per_second", draco_rate},
+          {"bytes_per_frame", draco.frames ? draco.bytes / double(draco.frames) : 0},
+          {"rill_over_draco", draco_rate > 0 ? rill_rate / draco_rate : 0}}}};
+    if (!options.quiet && options.json != "-") {
+        std::printf("               mean microseconds per frame                         total\n");
+        std::printf("pass      jobs     plan  decode   field    mesh    wait   total       p50     p99     max  Mtri/s  allocations, output hash\n");
+        for (const Pass& pass : passes) print(pass);
+        std::printf("output %s; %llu allocations in frames; %s read cold; peak memory %s\n", same ? "identical in all passes" : "DIFFERS between passes",
+                    static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
+                    readable_bytes(memory["peak_bytes"].get<double>()).c_str());
+        if (draco_rate > 0)
+            std::printf("Draco decodes the same meshes at %.2f Mtri/s (10 bits, one core): Rill runs at %.2f times that\n", draco_rate / 1e6,
+                        rill_rate / draco_rate);
+    }
+    if (!options.json.empty()) write_json(options.json, json);
+    return exit_done;
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, Run& run) {
+    auto options = std::make_shared<BenchOptions>();
+    CLI::App* command = app.add_subcommand("bench", "Time the runtime on an asset");
+    command->add_option("ASSET", options->asset, "The asset, .rill")->required();
+    command->add_option("--jobs", options->jobs, "Measure with 1 to N threads; 0: all cores")->check(CLI::Range(0, 256));
+    command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive");
+    command->add_option("--json", options->json, "Write the report as JSON; - is standard output");
+    command->add_flag("--quiet", options->quiet, "Errors only");
+    command->callback([&run, options] { run = [options] { return bench_command(*options); }; });
+}
+
+}  // namespace rill::cooker

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// One file per subcommand: options → settings → a call into rill::cooker → text and exit code.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "readers/reader.h"
+
+namespace rill::cooker {
+
+enum ExitCode { exit_done = 0, exit_usage = 1, exit_input = 2, exit_target_missed = 3 };
+
+/// Set by the subcommand that was named; returns the exit code, or throws UsageError or InputError.
+using Run = std::function<int()>;
+void add_cook(CLI::App& app, Run& run);
+void add_info(CLI::App& app, Run& run);
+void add_verify(CLI::App& app, Run& run);
+void add_export(CLI::App& app, Run& run);
+void add_compare(CLI::App& app, Run& run);
+void add_bench(CLI::App& app, Run& run);
+
+/// `A:B[:S]`, or one number; inclusive, source numbers. Throws UsageError.
+struct FrameRange {
+    int first = 0, last = 0, step = 0;  ///< step 0: no range was given
+};
+FrameRange parse_frames(const std::string& text);
+
+/// How a sequence is to be read, shared by the commands that read one.
+struct InputOptions {
+    std::string path, velocity_unit = "second";
+    ReadOptions read;
+    void add_to(CLI::App& command);
+    ReadOptions checked() const;  ///< with warnings to stderr. Throws UsageError
+};
+
+/// Progress of `total` frames on stderr: one line with rate and time left on a terminal, a plain line every
+/// quarter otherwise; the clock starts anew with every stage. Any thread, one at a time.
+class Progress {
+public:
+    Progress(std::string what, bool quiet);
+    ~Progress();
+    void operator()(const std::string& stage, double done, double total);
+
+private:
+    std::string what_;
+    bool quiet_, terminal_, open_line_ = false;
+    int last_quarter_ = 0;
+    std::string last_stage_;
+    std::chrono::steady_clock::time_point start_, stage_end_, last_shown_;
+};
+
+/// Written with two spaces of indent and sorted keys; "-" is standard output.
+void write_json(const std::string& path, const nlohmann::json& json);
+/// "12.3 kB", "4.56 MB".
+std::string readable_bytes(double bytes);
+
+}  // namespace rill::cooker

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "asset_directory.h"
+#include "commands/commands.h"
+#include "rill/rill.h"
+
+namespace rill::cooker {
+namespace {
+
+struct LayerFacts {
+    uint64_t bytes = 0, chunks = 0;
+    double spacing = 0, error_p99 = 0;  // means over chunks
+};
+
+/// Points that one frame may show, averaged over the clip: each window's tracks weighted by its frames.
+double points_per_window(const AssetDirectory& directory, uint64_t& drops) {
+    double sum = 0, frames = 0;
+    for (const format::WindowRecord& window : directory.windows) {
+        uint64_t points = 0;
+        for (uint32_t c = 0; c < window.chunk_count; ++c) {
+            points += directory.chunks[window.first_chunk + c].point_count;
+            drops += directory.chunks[window.first_chunk + c].drop_count;
+        }
+        sum += double(points) * window.sample_count, frames += window.sample_count;
+    }
+    return frames > 0 ? sum / frames : 0;
+}
+
+nlohmann::json describe(const std::string& path) {
+    using nlohmann::json;
+    const AssetDirectory directory = read_directory(path);
+    const format::Header& h = directory.header;
+    std::vector<LayerFacts> layers(h.layer_count);
+    uint64_t chunk_bytes = 0, drops = 0, blocks = 0;
+    for (const format::ChunkRecord& c : directory.chunks) {
+        LayerFacts& layer = layers[c.layer];
+        layer.bytes += c.bytes, ++layer.chunks, layer.spacing += c.spacing, layer.error_p99 += c.error_p99;
+        chunk_bytes += c.bytes;
+    }
+    json layer_list = json::array();
+    for (const LayerFacts& layer : layers)
+        layer_list.push_back({{"bytes", layer.bytes},
+                              {"chunks", layer.chunks},
+                              {"spacing_m", layer.chunks ? layer.spacing / double(layer.chunks) : 0},
+                              {"error_p99_m", layer.chunks ? layer.error_p99 / double(layer.chunks) : 0}});
+    json windows = json::array();
+    for (const format::WindowRecord& w : directory.windows) {
+        uint64_t bytes = 0, points = 0;
+        for (uint32_t c = 0; c < w.chunk_count; ++c)
+            bytes += directory.chunks[w.first_chunk + c].bytes, points += directory.chunks[w.first_chunk + c].point_count;
+        windows.push_back({{"first_frame", directory.frame_number(w.first_sample)},
+                           {"frames", w.sample_count},
+                           {"blocks", w.block_count},
+                           {"chunks", w.chunk_count},
+                           {"points", points},
+                           {"bytes", bytes}});
+        blocks = std::max<uint64_t>(blocks, w.block_count);
+    }
+    const double points = points_per_window(directory, drops);
+    json settings = json::parse(directory.settings_json, nullptr, false);
+    if (settings.is_discarded()) settings = nullptr;
+    char hash[17];
+    std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(h.content_hash));
+    return {{"report", "rill info"},
+            {"version", 1},
+            {"asset", path},
+            {"format", h.version},
+            {"content_hash", hash},
+            {"file_bytes", h.file_bytes},
+            {"directory_bytes", h.directory_bytes},
+            {"chunk_bytes", chunk_bytes},
+            {"bytes_per_frame", double(h.file_bytes) / h.frame_count},
+            {"frames", h.frame_count},
+            {"first_frame", h.first_frame},
+            {"frame_step", h.frame_step},
+            {"frames_per_second", h.frames_per_second},
+            {"first_seconds", h.first_seconds},
+            {"median_edge_m", h.cell_size},
+            {"lower", {h.lower[0], h.lower[1], h.lower[2]}},
+            {"upper", {h.upper[0], h.upper[1], h.upper[2]}},
+            {"points_per_window", points},
+            {"drop_tracks", drops},
+            {"most_blocks", blocks},
+            {"layers", layer_list},
+            {"windows", windows},
+            {"cook", settings}};
+}
+
+void print_bytes(const nlohmann::json& cook) {
+    const nlohmann::json* bytes = nullptr;
+    if (cook.is_object() && cook.contains("bytes") && cook["bytes"].is_object()) bytes = &cook["bytes"];
+    if (!bytes) return;
+    double total = 0;
+    for (const auto& [kind, value] : bytes->items())
+        if (value.is_number()) total += value.get<double>();
+    std::printf("bytes by kind\n");
+    for (const auto& [kind, value] : bytes->items())
+        if (value.is_number())
+            std::printf("  %-12s %12s  %5.1f %%\n", kind.c_str(), readable_bytes(value.get<double>()).c_str(),
+                        total > 0 ? 100 * value.get<double>() / total : 0);
+}
+
+void print(const nlohmann::json& info) {
+    auto number = [&](const char* key) { return info[key].get<double>(); };
+    std::printf("%s: Rill asset, format %.0f, content %s\n", info["asset"].get<std::string>().c_str(), number("format"),
+                info["content_hash"].get<std::string>().c_str());
+    std::printf("frames       %.0f from %.0f by %.0f, %g per second\n", number("frames"), number("first_frame"), number("frame_step"),
+                number("frames_per_second"));
+    std::printf("size         %s, %s per frame; directory %s\n", readable_bytes(number("file_bytes")).c_str(),
+                readable_bytes(number("bytes_per_frame")).c_str(), readable_bytes(number("directory_bytes")).c_str());
+    std::printf("points       %.0f per window on average, %.0f drop tracks in all\n", number("points_per_window"), number("drop_tracks"));
+    std::printf("bounds       %g %g %g to %g %g %g m; source edge %.4g m\n", info["lower"][0].get<double>(), info["lower"][1].get<double>(),
+                info["lower"][2].get<double>(), info["upper"][0].get<double>(), info["upper"][1].get<double>(),
+                info["upper"][2].get<double>(), number("median_edge_m"));
+    std::printf("layers\n");
+    for (size_t i = 0; i < info["layers"].size(); ++i) {
+        const nlohmann::json& layer = info["layers"][i];
+        std::printf("  %zu  %10s  %5.0f chunks, spacing %.4g m, p99 error up to here %.4g m\n", i,
+                    readable_bytes(layer["bytes"].get<double>()).c_str(), layer["chunks"].get<double>(), layer["spacing_m"].get<double>(),
+                    layer["error_p99_m"].get<double>());
+    }
+    std::printf("windows\n");
+    for (const nlohmann::json& window : info["windows"])
+        std::printf("  from frame %-5.0f %3.0f frames, %3.0f blocks, %4.0f chunks, %7.0f points, %10s\n", window["first_frame"].get<double>(),
+                    window["frames"].get<double>(), window["blocks"].get<double>(), window["chunks"].get<double>(),
+                    window["points"].get<double>(), readable_bytes(window["bytes"].get<double>()).c_str());
+    print_bytes(info["cook"]);
+    if (!info["cook"].is_null()) std::printf("cook\n%s\n", info["cook"].dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+}
+
+struct InfoOptions {
+    std::string asset;
+    bool json = false;
+};
+
+}  // namespace
+
+void add_info(CLI::App& app, Run& run) {
+    auto options = std::make_shared<InfoOptions>();
+    CLI::App* command = app.add_subcommand("info", "What is inside an asset");
+    command->add_option("ASSET", options->asset, "The asset, .rill")->required();
+    command->add_flag("--json", options->json, "As JSON on standard output");
+    command->callback([&run, options] {
+        run = [options] {
+            const nlohmann::json info = describe(options->asset);
+            if (options->json) write_json("-", info);
+            else print(info);
+            return int(exit_done);
+        };
+    });
+}
+
+}  // namespace rill::cooker

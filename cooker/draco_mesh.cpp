@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#include "draco_mesh.h"
+
+#include <draco/compression/decode.h>
+#include <draco/compression/encode.h>
+
+namespace rill::cooker {
+namespace {
+
+int add_vectors(draco::Mesh& mesh, const std::vector<glm::vec3>& values, draco::GeometryAttribute::Type type) {
+    draco::GeometryAttribute attribute;
+    attribute.Init(type, nullptr, 3, draco::DT_FLOAT32, false, sizeof(glm::vec3), 0);
+    const int id = mesh.AddAttribute(attribute, true, uint32_t(values.size()));
+    for (uint32_t i = 0; i < values.size(); ++i) mesh.attribute(id)->SetAttributeValue(draco::AttributeValueIndex(i), &values[i]);
+    return id;
+}
+
+std::vector<glm::vec3> get_vectors(const draco::Mesh& mesh, const draco::PointAttribute& attribute) {
+    std::vector<glm::vec3> values(mesh.num_points());
+    for (uint32_t i = 0; i < values.size(); ++i)
+        attribute.ConvertValue<float, 3>(attribute.mapped_index(draco::PointIndex(i)), &values[i].x);
+    return values;
+}
+
+}  // namespace
+
+std::string draco_encode(const Mesh& mesh, int bits) {
+    if (mesh.triangles.empty()) return {};
+    draco::Mesh target;
+    target.set_num_points(uint32_t(mesh.positions.size()));
+    target.SetNumFaces(mesh.triangles.size());
+    for (uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+        const Triangle& t = mesh.triangles[i];
+        target.SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
+    }
+    add_vectors(target, mesh.positions, draco::GeometryAttribute::POSITION);
+    if (!mesh.velocities.empty()) add_vectors(target, mesh.velocities, draco::GeometryAttribute::GENERIC);
+    draco::Encoder encoder;
+    encoder.SetSpeedOptions(0, 0);
+    encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::POSITION, bits);
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::GENERIC, bits);
+    draco::EncoderBuffer buffer;
+    if (const draco::Status status = encoder.EncodeMeshToBuffer(target, &buffer); !status.ok())
+        throw InputError(std::string("Draco cannot encode this mesh: ") + status.error_msg());
+    return std::string(buffer.data(), buffer.size());
+}
+
+Mesh draco_decode(const std::string& bytes, const std::string& name) {
+    Mesh mesh;
+    if (bytes.empty()) return mesh;
+    draco::DecoderBuffer buffer;
+    buffer.Init(bytes.data(), bytes.size());
+    draco::Decoder decoder;
+    auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+    if (!decoded.ok()) throw InputError(name + ": not a Draco mesh: " + decoded.status().error_msg());
+    const std::unique_ptr<draco::Mesh> source = std::move(decoded).value();
+    const draco::PointAttribute* position = source->GetNamedAttribute(draco::GeometryAttribute::POSITION);
+    if (!position || position->num_components() != 3) throw InputError(name + ": no positions of three components");
+    mesh.positions = get_vectors(*source, *position);
+    const draco::PointAttribute* generic = source->GetNamedAttribute(draco::GeometryAttribute::GENERIC);
+    if (generic && generic->num_components() == 3 && generic->data_type() == draco::DT_FLOAT32)
+        mesh.velocities = get_vectors(*source, *generic);
+    mesh.triangles.resize(source->num_faces());
+    for (uint32_t i = 0; i < mesh.triangles.size(); ++i)
+        for (int k = 0; k < 3; ++k) mesh.triangles[i][k] = source->face(draco::FaceIndex(i))[k].value();
+    return mesh;
+}
+
+}  // namespace rill::cooker

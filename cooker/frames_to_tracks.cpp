@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+#include "frames_to_tracks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "parallel.h"
+
+namespace rill::cooker {
+namespace {
+
+constexpr int coding_rounds = 2;
+constexpr int first_rounds = 8, later_rounds = 3;  // of births in the clip's first frame, and in the others
+constexpr int patience = 4;                        // frames a track is surplus before it dies
+constexpr float surplus_distance = 0.3f;           // of the tolerance
+constexpr float credible = 3;                      // tolerances a correction may be told to mend
+constexpr float surplus_angle = 0.1f;              // radians
+
+/// The points of one frame while the sweep stands there.
+struct Sweep {
+    std::vector<uint32_t> ids;  ///< of Window::paths
+    std::vector<SurfacePoint> points;
+};
+Sweep alive_at(const Window& window, int sample) {
+    Sweep sweep;
+    for (uint32_t i = 0; i < window.paths.size(); ++i)
+        if (window.paths[i].alive(sample)) sweep.ids.push_back(i), sweep.points.push_back(window.paths[i].target(sample));
+    return sweep;
+}
+
+/// Carries every track alive at sample − 1 on to sample; those that cannot be carried have died.
+void carry_on(Window& window, int sample, int jobs) {
+    const SurfaceFrame &from = *window.frames[size_t(sample - 1)], &to = *window.frames[size_t(sample)];
+    const float seconds = float(window.seconds[size_t(sample)] - window.seconds[size_t(sample - 1)]);
+    parallel_for(window.paths.size(), jobs, [&](size_t i) {
+        Path& path = window.paths[i];
+        if (path.death != sample - 1 || path.cause != Death::none) return;
+        if (const auto next = carry_point(from, to, seconds, path.at.back(), path.radius)) {
+            path.at.push_back(*next);
+            path.correction.push_back(path.correction.back()), path.tilt.push_back(path.tilt.back());
+            ++path.death;
+        } else {
+            path.cause = Death::left_surface;
+        }
+    });
+}
+
+/// A track that stands here for the last time: it dies at this sample or, if it only just came, never was.
+void end(Path& path, int sample, Death cause) {
+    path.cause = cause;
+    if (path.death == sample && path.death > path.birth) {
+        --path.death;
+        path.at.pop_back(), path.correction.pop_back(), path.tilt.pop_back();
+    }
+}
+
+/// Ends tracks that have run into each other, younger first, and those that their neighbours make needless.
+void thin_out(Window& window, int sample, const WindowGoal& goal) {
+    const Sweep sweep = alive_at(window, sample);
+    const Surplus surplus = measure_surplus(sweep.points, goal.jobs);
+    std::vector<glm::vec3> positions;
+    for (const SurfacePoint& p : sweep.points) positions.push_back(p.position);
+    const VertexTree tree(positions);
+    std::vector<VertexTree::Found> found;
+    std::vector<uint32_t> order(sweep.ids.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {  // youngest first
+        return window.paths[sweep.ids[a]].birth > window.paths[sweep.ids[b]].birth;
+    });
+    std::vector<bool> gone(order.size(), false);
+    for (uint32_t k : order) {
+        Path& path = window.paths[sweep.ids[k]];
+        const bool needless = surplus.distance[k] < surplus_distance * goal.tolerance && surplus.angle[k] < surplus_angle;
+        path.surplus = needless ? path.surplus + 1 : 0;
+        tree.nearest(positions[k], 9, found);
+        float nearest = 1e30f, third = 1e30f;
+        int same = 0;
+        bool neighbour_gone = false;
+        for (const auto& f : found) {
+            if (f.vertex == k || glm::dot(sweep.points[f.vertex].normal, sweep.points[k].normal) < 0.3f) continue;
+            neighbour_gone |= gone[f.vertex];
+            if (gone[f.vertex]) continue;
+            const float d = std::sqrt(f.distance2);
+            if (++same == 1) nearest = d;
+            if (same == 3) third = d;
+        }
+        const bool crowded = nearest < 0.4f * window.frames[size_t(sample)]->edge || (same >= 3 && nearest < 0.2f * third);
+        if (!crowded && (path.surplus < patience || neighbour_gone)) continue;
+        gone[k] = true;
+        end(path, sample, crowded ? Death::crowded : Death::surplus);
+    }
+}
+
+float spacing_at(const std::vector<SurfacePoint>& points, const VertexTree& tree, const SurfacePoint& p, float most) {
+    thread_local std::vector<VertexTree::Found> found;
+    tree.nearest(p.position, 8, found);
+    int same = 0;
+    for (const auto& f : found)
+        if (glm::dot(points[f.vertex].normal, p.normal) > 0.3f && ++same == 4) return std::min(most, std::sqrt(f.distance2));
+    return most;
+}
+
+/// Bears tracks where the frame misses the source; returns how many.
+size_t bear_tracks(Window& window, int sample, const Residual& residual, const std::vector<SurfacePoint>& points,
+                   const WindowGoal& goal) {
+    const SurfaceFrame& frame = *window.frames[size_t(sample)];
+    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, goal.tolerance);
+    std::vector<SurfacePoint> all = points;
+    all.insert(all.end(), births.begin(), births.end());
+    std::vector<glm::vec3> positions;
+    for (const SurfacePoint& p : all) positions.push_back(p.position);
+    const VertexTree tree(positions);
+    std::vector<Path> paths(births.size());
+    parallel_for(births.size(), goal.jobs, [&](size_t i) {
+        SurfacePoint p = births[i];
+        Path& path = paths[i];
+        path.radius = std::max(1.6f * frame.edge, 0.7f * spacing_at(all, tree, p, 8 * frame.edge));
+        if (!settle(frame, path.radius, p)) return;
+        path.birth = path.death = sample;
+        path.at = {p}, path.correction = {0.f}, path.tilt = {glm::vec2(0)};
+    });
+    const size_t before = window.paths.size();
+    for (Path& path : paths)
+        if (!path.at.empty()) window.paths.push_back(std::move(path));
+    return window.paths.size() - before;
+}
+
+/// Corrections and births at one frame until little is missed.
+void fill_frame(Window& window, int sample, int rounds, const WindowGoal& goal) {
+    const SurfaceFrame& frame = *window.frames[size_t(sample)];
+    for (int round = 0;; ++round) {
+        Sweep sweep = alive_at(window, sample);
+        Residual residual = measure_residual(frame, sweep.points, goal.jobs);
+        correct_paths(frame, residual, sweep.points, sweep.ids, sample, credible * goal.tolerance, window.paths);
+        if (round == rounds) break;
+        sweep = alive_at(window, sample);
+        residual = measure_residual(frame, sweep.points, goal.jobs);
+        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal);
+        if (born * 100 <= sweep.points.size()) break;
+    }
+}
+
+TrackSamples samples_of(const Window& window, const Path& path) {
+    TrackSamples samples;
+    samples.birth = uint8_t(path.birth), samples.death = uint8_t(path.death);
+    const bool enters = path.birth == 0 && (path.continues || window.opens_clip);
+    const bool leaves = path.death == window.samples() - 1;
+    samples.flags = uint8_t((enters ? 0 : format::track_born) | (leaves ? 0 : format::track_dies));
+    for (int s = path.birth; s <= path.death; ++s) {
+        const SurfacePoint p = path.target(s);
+        samples.position.push_back(p.position), samples.normal.push_back(p.normal);
+    }
+    return samples;
+}
+
+/// Where the corrected surface is under x, along the axis.
+float project(const Window& window, const Path& path, int sample, const glm::vec3& x, const glm::vec3& axis) {
+    const size_t k = size_t(sample - path.birth);
+    SurfacePoint p{x, path.at[k].normal, {}};
+    // The slack may have lifted x off the surface: come back first, then fit.
+    p.position -= p.normal * glm::dot(x - path.at[k].position, p.normal);
+    if (!settle(*window.frames[size_t(sample)], path.radius, p)) return NAN;
+    const float along = glm::dot(p.normal, axis);
+    return along < 0.3f ? NAN : (glm::dot(p.normal, p.position - x) + path.correction[k]) / along;
+}
+
+}  // namespace
+
+void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal) {
+    window.paths = survivors;
+    for (int s = 0; s < window.samples(); ++s) {
+        if (s > 0) {
+            carry_on(window, s, goal.jobs);
+            thin_out(window, s, goal);
+        }
+        if (s > 0 || survivors.empty()) fill_frame(window, s, window.opens_clip && s == 0 ? first_rounds : later_rounds, goal);
+    }
+    std::erase_if(window.paths, [](const Path& path) { return path.at.empty(); });
+}
+
+CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables) {
+    CodedWindow coded;
+    std::vector<double> p99(window.frames.size());
+    for (int round = 0;; ++round) {
+        coded.tracks.resize(window.paths.size()), coded.decoded.resize(window.paths.size());
+        parallel_for(window.paths.size(), goal.jobs, [&](size_t i) {
+            const Path& path = window.paths[i];
+            coded.tracks[i] = quantise_track(samples_of(window, path), goal.quantiser, goal.origin, tables,
+                                             [&](uint32_t k, const glm::vec3& x, const glm::vec3& axis) {
+                                                 return project(window, path, path.birth + int(k), x, axis);
+                                             });
+            coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
+        });
+        parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
+            const SurfaceFrame& frame = *window.frames[s];
+            std::vector<uint32_t> ids;
+            const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
+            const Residual residual = measure_residual(frame, points);
+            p99[s] = residual_percentile(frame, residual, 0.99);
+            if (round < coding_rounds) correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
+        });
+        if (round == coding_rounds) break;
+    }
+    for (double value : p99) coded.residual_p99 += value / double(p99.size());
+    return coded;
+}
+
+std::vector<Path> survivors_of(const Window& window) {
+    std::vector<Path> survivors;
+    for (const Path& path : window.paths) {
+        if (path.death != window.samples() - 1) continue;
+        Path last;
+        last.radius = path.radius, last.continues = true, last.surplus = path.surplus;
+        last.at = {path.at.back()}, last.correction = {path.correction.back()}, last.tilt = {path.tilt.back()};
+        survivors.push_back(std::move(last));
+    }
+    return survivors;
+}
+
+std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample,
+                                         const std::vector<uint32_t>* layer, uint32_t last_layer, std::vector<uint32_t>* ids) {
+    std::vector<SurfacePoint> points;
+    for (uint32_t i = 0; i < decoded.size(); ++i) {
+        const TrackSamples& track = decoded[i];
+        if (sample < track.birth || sample > track.death || track.drop || (layer && (*layer)[i] > last_layer)) continue;
+        const size_t k = size_t(sample - track.birth);
+        points.push_back({track.position[k], track.normal[k], {}});
+        if (ids) ids->push_back(i);
+    }
+    return points;
+}
+
+}  // namespace rill::cooker

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// One window: frames in, coded tracks out; the loop that drives the stages of pipeline.h.
+#pragma once
+#include <vector>
+
+#include "pipeline.h"
+
+namespace rill::cooker {
+
+/// What the loop aims at; everything scales with the tolerance.
+struct WindowGoal {
+    float tolerance = 0;          ///< metres: births where the decoded surface misses the source by more
+    Quantiser quantiser{};
+    glm::vec3 origin{};
+    int jobs = 0;
+};
+struct CodedWindow {
+    std::vector<QuantisedTrack> tracks;   ///< parallel to Window::paths
+    std::vector<TrackSamples> decoded;    ///< what each decodes to
+    double residual_p99 = 0;              ///< metres: largest frame percentile is not hidden: mean over frames
+};
+
+/// Fills window.paths: survivors of the window before (points on its last frame) are carried on, then births and
+/// corrections alternate until nothing is missed.
+void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal);
+/// Quantises the tracks and corrects them against what they decode to.
+CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables);
+/// Those that reach the last sample, as one-sample paths: what the next window continues.
+std::vector<Path> survivors_of(const Window& window);
+/// Decoded points at a sample, with the tracks they belong to; only layers ≤ last_layer.
+std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample,
+                                         const std::vector<uint32_t>* layer = nullptr, uint32_t last_layer = 0,
+                                         std::vector<uint32_t>* ids = nullptr);
+
+}  // namespace rill::cooker

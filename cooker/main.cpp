@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The `rill` tool. Exit codes: 0 done, 1 bad usage, 2 bad input or asset, 3 done but a stated target was missed.
+#include <cstdio>
+#include <new>
+
+#include "commands/commands.h"
+
+int main(int argc, char** argv) {
+    using namespace rill::cooker;
+    CLI::App app("Fluid mesh sequences as small streamable assets", "rill");
+    app.set_version_flag("--version", "rill " RILL_VERSION);
+    app.require_subcommand(1);
+    Run run;
+    add_cook(app, run);
+    add_info(app, run);
+    add_verify(app, run);
+    add_export(app, run);
+    add_compare(app, run);
+    add_bench(app, run);
+    try {
+        app.parse(argc, argv);
+        return run();
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? exit_done : exit_usage;
+    } catch (const UsageError& error) {
+        std::fprintf(stderr, "rill: %s\n", error.what());
+        return exit_usage;
+    } catch (const InputError& error) {
+        std::fprintf(stderr, "rill: %s\n", error.what());
+        return exit_input;
+    } catch (const std::bad_alloc&) {
+        std::fprintf(stderr, "rill: out of memory\n");
+        return exit_input;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "rill: %s\n", error.what());
+        return exit_input;
+    }
+}

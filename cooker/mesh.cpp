@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "mesh.h"
+
+#include <algorithm>
+
+namespace rill::cooker {
+
+std::vector<glm::vec3> vertex_normals(const Mesh& mesh) {
+    std::vector<glm::vec3> normals(mesh.positions.size(), glm::vec3(0));
+    for (const Triangle& t : mesh.triangles) {
+        const glm::vec3 a = mesh.positions[t[0]];
+        // Its length is twice the area: adding it unscaled is what weights by area.
+        const glm::vec3 face = glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a);
+        for (uint32_t v : t) normals[v] += face;
+    }
+    for (glm::vec3& n : normals) {
+        const double length = glm::length(glm::dvec3(n));  // squares of tiny areas underflow in float
+        n = length > 0 ? glm::vec3(glm::dvec3(n) / length) : glm::vec3(0);
+    }
+    return normals;
+}
+
+float median_edge(const Mesh& mesh) {
+    constexpr size_t most = 100000;
+    const size_t edges = mesh.triangles.size() * 3;
+    if (edges == 0) return 0;
+    const size_t count = std::min(edges, most);
+    std::vector<float> lengths(count);
+    for (size_t i = 0; i < count; ++i) {
+        const size_t edge = edges * i / count;
+        const Triangle& t = mesh.triangles[edge / 3];
+        lengths[i] = glm::distance(mesh.positions[t[edge % 3]], mesh.positions[t[(edge + 1) % 3]]);
+    }
+    std::nth_element(lengths.begin(), lengths.begin() + count / 2, lengths.end());
+    return lengths[count / 2];
+}
+
+double signed_volume(const Mesh& mesh) {
+    if (mesh.triangles.empty()) return 0;
+    const glm::dvec3 origin = mesh.positions[mesh.triangles[0][0]];  // near the mesh: less cancellation
+    double six_volumes = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const glm::dvec3 a = glm::dvec3(mesh.positions[t[0]]) - origin;
+        const glm::dvec3 b = glm::dvec3(mesh.positions[t[1]]) - origin;
+        const glm::dvec3 c = glm::dvec3(mesh.positions[t[2]]) - origin;
+        six_volumes += glm::dot(a, glm::cross(b, c));
+    }
+    return six_volumes / 6;
+}
+
+}  // namespace rill::cooker

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// All stages of the cook, top to bottom, with what passes between them. One window at a time:
+//
+//   frames_to_samples      where the surface decoded so far is wrong, new points are born
+//   samples_to_tracks      points are carried through the window's frames, both ways, held to the surface
+//   tracks_to_surface      what the tracks decode to, measured at every source vertex; corrections
+//   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
+//   coefficients_to_layers progressive order, blocks
+//   layers_to_chunks       entropy coding
+//   chunks_to_asset        the file
+#pragma once
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "format/layout.h"
+#include "layers_to_chunks.h"
+#include "surface_frame.h"
+
+namespace rill::cooker {
+
+/// Why a track ends before its window does.
+enum class Death { none, left_surface, crowded, surplus };
+
+/// One track while it is made: samples birth … death of its window.
+struct Path {
+    int birth = 0, death = 0;
+    bool continues = false;              ///< comes from the previous window
+    Death cause = Death::none;           ///< set: is not carried on
+    int surplus = 0;                     ///< frames in a row that it was not needed
+    float radius = 0;                    ///< of the local fit that places it, metres
+    std::vector<SurfacePoint> at;        ///< on the smoothed source surface, death − birth + 1
+    std::vector<float> correction;       ///< along the normal: what makes the decoded surface fit best, metres
+    std::vector<glm::vec2> tilt;         ///< likewise of the normal, in its tangent frame
+    bool alive(int sample) const { return sample >= birth && sample <= death; }
+    /// Corrected point at a sample of its life: what is coded.
+    SurfacePoint target(int sample) const;
+};
+
+struct Window {
+    int first = 0;                       ///< frame index of sample 0
+    bool opens_clip = false, ends_clip = false;
+    std::vector<std::shared_ptr<const SurfaceFrame>> frames;
+    std::vector<double> seconds;
+    std::vector<Path> paths;
+    int samples() const { return int(frames.size()); }
+};
+
+/// What a set of points means at the vertices of a frame.
+struct Residual {
+    std::vector<float> distance;         ///< signed, metres, per source vertex: positive where the source lies outside
+                                         ///< the decoded surface; ±missing where nothing is decoded there
+    std::vector<float> support;          ///< per input point: radius of its patch
+};
+inline constexpr float missing = 1e3f;
+Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, int jobs = 1);
+/// How far each point lies from what its neighbours alone would decode to: metres, and radians of the normal.
+struct Surplus {
+    std::vector<float> distance, angle;
+};
+Surplus measure_surplus(const std::vector<SurfacePoint>& points, int jobs);
+/// Area-weighted percentile of |distance|.
+double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction);
+
+/// New points where |residual| exceeds `threshold`: worst first, no two closer than half the spacing of the points
+/// that were measured.
+std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual,
+                                        const std::vector<SurfacePoint>& points, float threshold);
+
+/// Carries the point at samples[from] to the neighbouring frame; empty where the surface leaves it.
+std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const SurfaceFrame& to, float seconds,
+                                        const SurfacePoint& point, float radius);
+/// One step of least-squares progressive iterative approximation: every point moves along its normal, and
+/// tilts, by the weighted mean residual around it. Residuals beyond `credible` metres are another sheet's, or for a
+/// birth to mend. `points` and `ids`: as measured, and which path each is.
+void correct_paths(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
+                   const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths);
+
+/// Layer of every track (0 coarsest): each prefix of layers covers the surface evenly in every frame.
+std::vector<uint32_t> assign_layers(const Window& window, uint32_t layers);
+/// Block of every track: a median split of the mean positions, at most 2^splits blocks.
+std::vector<uint32_t> assign_blocks(const Window& window, uint32_t most_tracks, uint32_t& block_count);
+
+}  // namespace rill::cooker

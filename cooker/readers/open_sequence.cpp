@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// A path → the reader for what lies there.
+#include <cmath>
+
+#include "readers/frame_files.h"
+#include "sequence_to_frames.h"
+
+namespace rill::cooker {
+namespace fs = std::filesystem;
+namespace {
+
+std::string what_is_read() {
+    std::string text = "Rill reads Mantaflow cache directories";
+    for (const FrameFormat& format : frame_formats()) text += ", " + format.extension + " files";
+    return text;
+}
+
+std::unique_ptr<SequenceReader> open_directory(const fs::path& directory, const ReadOptions& options) {
+    if (auto reader = open_mantaflow(directory, options)) return reader;
+    std::unique_ptr<SequenceReader> found;
+    std::string found_extension;
+    for (const FrameFormat& format : frame_formats()) {
+        std::vector<FrameFile> files = find_frames(directory, "*" + format.extension);
+        if (files.empty()) continue;
+        if (found)
+            throw InputError(directory.string() + ": holds both " + found_extension + " and " + format.extension +
+                             " files; name one kind with a pattern such as '" + (directory / ("*" + format.extension)).string() + "'");
+        found = open_frame_files(format, std::move(files), directory.string(), options);
+        found_extension = format.extension;
+    }
+    if (found) return found;
+    if (fs::is_empty(directory)) throw InputError(directory.string() + ": the directory is empty");
+    throw InputError(directory.string() + ": no frames found; " + what_is_read());
+}
+
+std::unique_ptr<SequenceReader> open_files(const fs::path& path, const ReadOptions& options) {
+    const FrameFormat* format = format_of(path);
+    const bool pattern = is_pattern(path.filename().string()) && !fs::exists(path);
+    if (!pattern && !fs::exists(path)) throw InputError(path.string() + ": no such file or directory");
+    if (!format) throw InputError(path.string() + ": unknown format '" + path.extension().string() + "'; " + what_is_read());
+    std::vector<FrameFile> files;
+    if (pattern) {
+        const fs::path directory = path.has_parent_path() ? path.parent_path() : fs::path(".");
+        files = find_frames(directory, path.filename().string());
+        if (files.empty()) throw InputError(path.string() + ": no file matches");
+    } else {
+        files.push_back({frame_number(path, 1), path});
+    }
+    return open_frame_files(*format, std::move(files), path.string(), options);
+}
+
+}  // namespace
+
+std::unique_ptr<SequenceReader> open_sequence(const std::string& input, const ReadOptions& options) {
+    if (options.frames_per_second < 0 || !std::isfinite(options.frames_per_second))
+        throw UsageError("the frame rate must be positive");
+    if (options.step < 0 || (options.step > 0 && options.last < options.first))
+        throw UsageError("frames A:B:S need A <= B and S >= 1");
+    if (options.velocity_name == "estimate")
+        throw UsageError("--velocity estimate is not available in this version: export the velocity with the mesh");
+    try {
+        const fs::path path(input);
+        return sequence_to_frames(fs::is_directory(path) ? open_directory(path, options) : open_files(path, options), options);
+    } catch (const fs::filesystem_error& error) {
+        throw InputError(input + ": " + error.code().message());
+    }
+}
+
+}  // namespace rill::cooker

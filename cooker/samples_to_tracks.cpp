@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// Points carried through time by the fluid's velocity and held to the surface.
+//
+// The velocity of a frame alone does not land on the next surface in violent liquid (2–5 cells a frame, into
+// walls and other liquid). So the path is sub-stepped through the velocities of BOTH frames, which also serves
+// sources whose velocity is the one that brought the liquid here; where it leaves the surface, the point slides:
+// first along its own tangent motion, at last staying where it is.
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline.h"
+
+namespace rill::cooker {
+namespace {
+
+constexpr int sub_steps = 4;
+constexpr float least_agreement = 0.2f;  // n·n of a vertex that may hold the point
+
+/// Nearest vertex that faces like `normal`; ~0u if none among the nearest.
+uint32_t nearest_facing(const SurfaceFrame& frame, const glm::vec3& x, const glm::vec3& normal, size_t among) {
+    thread_local std::vector<VertexTree::Found> found;
+    frame.tree.nearest(x, among, found);
+    for (const auto& f : found)
+        if (glm::dot(frame.mesh.normals[f.vertex], normal) > least_agreement) return f.vertex;
+    return ~0u;
+}
+
+glm::vec3 velocity_near(const SurfaceFrame& frame, const glm::vec3& x, const glm::vec3& normal) {
+    const uint32_t v = nearest_facing(frame, x, normal, 4);
+    return v == ~0u || frame.mesh.velocities.empty() ? glm::vec3(0) : frame.mesh.velocities[v];
+}
+
+/// The point of the smoothed surface near x, if the surface comes within `reach`.
+std::optional<SurfacePoint> hold(const SurfaceFrame& frame, const glm::vec3& x, const glm::vec3& normal, float radius,
+                                 float reach) {
+    const uint32_t v = nearest_facing(frame, x, normal, 12);
+    if (v == ~0u) return {};
+    // Drop onto the tangent plane at the vertex, so that the point keeps its place along the surface.
+    const glm::vec3 n = frame.mesh.normals[v], p = frame.mesh.positions[v];
+    if (glm::length(x - p) > reach) return {};
+    glm::vec3 on = x - n * glm::dot(x - p, n);
+    if (glm::length(on - p) > 2 * frame.edge) on = p;
+    SurfacePoint held{on, n, {}};
+    if (!settle(frame, radius, held) || glm::length(held.position - x) > reach) return {};
+    return held;
+}
+
+}  // namespace
+
+std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const SurfaceFrame& to, float seconds,
+                                        const SurfacePoint& point, float radius) {
+    if (from.mesh.positions.empty() || to.mesh.positions.empty()) return {};
+    glm::vec3 x = point.position;
+    for (int s = 0; s < sub_steps; ++s) {
+        const float t = (float(s) + 0.5f) / sub_steps;
+        const glm::vec3 v = glm::mix(velocity_near(from, x, point.normal), velocity_near(to, x, point.normal), t);
+        x += v * (seconds / sub_steps);
+    }
+    const float moved = glm::length(x - point.position);
+    const float reach = 2 * to.edge + 0.4f * std::min(moved, 4 * radius);
+    if (auto held = hold(to, x, point.normal, radius, reach)) return held;
+    // The fluid leaves the surface (merges, dives): the tangential half of the motion, then none.
+    const glm::vec3 slide = x - point.normal * glm::dot(x - point.position, point.normal);
+    if (auto held = hold(to, glm::mix(point.position, slide, 0.5f), point.normal, radius, 2 * to.edge)) return held;
+    return hold(to, point.position, point.normal, radius, 2 * to.edge);
+}
+
+}  // namespace rill::cooker

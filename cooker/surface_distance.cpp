@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+#include "surface_distance.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace rill::cooker {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+struct Sample {
+    float distance, weight;
+};
+/// Everything one direction adds up; two of them pool into the symmetric figures.
+struct Sums {
+    std::vector<Sample> samples;
+    double weight = 0, distance = 0, maximum = 0, degrees = 0, degrees_weight = 0;
+
+    void add(float d, double w) {
+        samples.push_back({d, float(w)});
+        weight += w, distance += w * d, maximum = std::max(maximum, double(d));
+    }
+    void add_angle(const glm::vec3& m, const glm::vec3& n, double w) {
+        const glm::dvec3 a(m), b(n);
+        if (glm::dot(a, a) == 0 || glm::dot(b, b) == 0) return;
+        // atan2 keeps its digits near 0 and 180 degrees, where acos loses them.
+        degrees += w * std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 57.295779513082320877;
+        degrees_weight += w;
+    }
+    void add(const Sums& other) {
+        samples.insert(samples.end(), other.samples.begin(), other.samples.end());
+        weight += other.weight, distance += other.distance, maximum = std::max(maximum, other.maximum);
+        degrees += other.degrees, degrees_weight += other.degrees_weight;
+    }
+    /// The distance that 99 % of the area keeps below.
+    double p99() {
+        std::sort(samples.begin(), samples.end(),
+                  [](const Sample& a, const Sample& b) { return a.distance < b.distance; });
+        double above = weight * 0.01;
+        for (size_t i = samples.size(); i-- > 0;)
+            if ((above -= samples[i].weight) < 0) return samples[i].distance;
+        return samples.empty() ? 0 : samples.back().distance;
+    }
+    DirectedDistance result() {
+        return {weight > 0 ? distance / weight : 0, p99(), maximum, degrees_weight > 0 ? degrees / degrees_weight : 0};
+    }
+};
+
+/// Per triangle, ¾ of the area at the centroid and 1/12 at each corner: exact for quadratic functions.
+Sums measure(const Mesh& from, const std::vector<glm::vec3>& from_normals, const SurfaceIndex& to,
+             const std::vector<glm::vec3>& to_normals, std::vector<float>* per_vertex) {
+    Sums sums;
+    sums.samples.reserve(from.positions.size() + from.triangles.size());
+    std::vector<double> weights(from.positions.size(), 0.0);
+    std::vector<bool> used(from.positions.size(), false);
+    auto sample = [&](const glm::vec3& x, const glm::vec3& normal, double weight) {
+        const SurfaceIndex::Hit hit = to.closest(x, infinity);
+        sums.add(hit.distance, weight);
+        const Triangle& t = to.mesh().triangles[hit.triangle];
+        sums.add_angle(normal, to_normals[t[0]] * hit.barycentric.x + to_normals[t[1]] * hit.barycentric.y +
+                                   to_normals[t[2]] * hit.barycentric.z, weight);
+        return hit.distance;
+    };
+    for (const Triangle& t : from.triangles) {
+        const glm::vec3 a = from.positions[t[0]], b = from.positions[t[1]], c = from.positions[t[2]];
+        const double area = 0.5 * glm::length(glm::dvec3(glm::cross(b - a, c - a)));
+        for (uint32_t v : t) weights[v] += area / 12, used[v] = true;
+        sample((a + b + c) / 3.0f, from_normals[t[0]] + from_normals[t[1]] + from_normals[t[2]], area * 0.75);
+    }
+    if (per_vertex) per_vertex->assign(from.positions.size(), 0.0f);
+    for (size_t v = 0; v < weights.size(); ++v) {
+        if (!used[v]) continue;
+        const float distance = sample(from.positions[v], from_normals[v], weights[v]);
+        if (per_vertex) (*per_vertex)[v] = distance;
+    }
+    return sums;
+}
+
+/// Disjoint sets over vertices, joined by triangles.
+struct Components {
+    std::vector<uint32_t> parent;
+    explicit Components(const Mesh& mesh) : parent(mesh.positions.size()) {
+        for (uint32_t v = 0; v < parent.size(); ++v) parent[v] = v;
+        for (const Triangle& t : mesh.triangles) join(t[0], t[1]), join(t[0], t[2]);
+    }
+    uint32_t root(uint32_t v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    }
+    void join(uint32_t a, uint32_t b) {
+        a = root(a), b = root(b);
+        parent[std::max(a, b)] = std::min(a, b);
+    }
+};
+
+constexpr int mantissa_bits = 4;                         // 16 bins to the octave
+constexpr int shift = 23 - mantissa_bits;                // a float's bits, cut off there, count up with its value
+constexpr size_t bins = (0x7f800000u >> shift) + 1;      // up to and with infinity
+
+}  // namespace
+
+void DistanceHistogram::add(float distance, double weight) {
+    if (area.empty()) area.resize(bins);
+    area[std::min<size_t>(std::bit_cast<uint32_t>(std::abs(distance)) >> shift, bins - 1)] += weight;
+}
+
+void DistanceHistogram::add(const DistanceHistogram& other) {
+    if (area.empty()) area.resize(bins);
+    for (size_t i = 0; i < other.area.size(); ++i) area[i] += other.area[i];
+}
+
+float DistanceHistogram::distance_of(size_t bin) { return std::bit_cast<float>(uint32_t(std::min(bin, bins - 1)) << shift); }
+
+double DistanceHistogram::quantile(double q) const {
+    double total = 0, below = 0;
+    for (double a : area) total += a;
+    if (total == 0) return 0;
+    for (size_t i = 0; i < area.size(); ++i) {
+        if (area[i] > 0 && below + area[i] >= q * total) {
+            if (i + 1 >= bins) return infinity;
+            const double share = (q * total - below) / area[i];
+            return distance_of(i) + share * (double(distance_of(i + 1)) - distance_of(i));
+        }
+        below += area[i];
+    }
+    return 0;
+}
+
+Topology topology(const Mesh& mesh) {
+    Topology result;
+    result.volume = signed_volume(mesh);
+    std::vector<std::pair<uint64_t, bool>> edges;  // (lower, higher vertex), whether walked upwards
+    edges.reserve(mesh.triangles.size() * 3);
+    for (const Triangle& t : mesh.triangles)
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t a = t[k], b = t[(k + 1) % 3];
+            edges.emplace_back(uint64_t(std::min(a, b)) << 32 | std::max(a, b), a < b);
+        }
+    std::sort(edges.begin(), edges.end());
+    for (size_t i = 0, next; i < edges.size(); i = next) {
+        for (next = i + 1; next < edges.size() && edges[next].first == edges[i].first;) ++next;
+        if (next - i == 1)
+            ++result.open_edges;
+        else if (next - i > 2 || edges[i].second == edges[i + 1].second)
+            ++result.non_manifold_edges;
+    }
+    result.components = uint32_t(component_volumes(mesh).size());
+    return result;
+}
+
+std::vector<double> component_volumes(const Mesh& mesh) {
+    Components components(mesh);
+    std::vector<double> six_volumes(mesh.positions.size(), 0.0);
+    std::vector<bool> used(mesh.positions.size(), false);
+    for (const Triangle& t : mesh.triangles) {
+        const uint32_t root = components.root(t[0]);
+        const glm::dvec3 origin = mesh.positions[root];
+        const glm::dvec3 a = glm::dvec3(mesh.positions[t[0]]) - origin;
+        const glm::dvec3 b = glm::dvec3(mesh.positions[t[1]]) - origin;
+        const glm::dvec3 c = glm::dvec3(mesh.positions[t[2]]) - origin;
+        six_volumes[root] += glm::dot(a, glm::cross(b, c));
+        used[root] = true;
+    }
+    std::vector<double> volumes;
+    for (size_t v = 0; v < used.size(); ++v)
+        if (used[v]) volumes.push_back(six_volumes[v] / 6);
+    std::sort(volumes.begin(), volumes.end(), std::greater<>());
+    return volumes;
+}
+
+SurfaceDistance surface_distance(const Mesh& source, const SurfaceIndex& source_index, const Mesh& decoded,
+                                 const SurfaceIndex& decoded_index, bool keep_per_vertex) {
+    SurfaceDistance result;
+    if (source.triangles.empty() && decoded.triangles.empty()) return result;
+    if (source.triangles.empty() || decoded.triangles.empty()) {
+        result.forward = result.backward = {infinity, infinity, infinity, 0};
+        result.mean = result.p99 = result.max = infinity;
+        const Mesh& there = source.triangles.empty() ? decoded : source;
+        for (const Triangle& t : there.triangles) {
+            const glm::vec3 a = there.positions[t[0]];
+            result.histogram.add(infinity, 0.5 * glm::length(glm::cross(there.positions[t[1]] - a, there.positions[t[2]] - a)));
+        }
+        if (keep_per_vertex) result.per_source_vertex.assign(source.positions.size(), infinity);
+        return result;
+    }
+    const std::vector<glm::vec3> source_normals = source.normals.empty() ? vertex_normals(source) : source.normals;
+    const std::vector<glm::vec3> decoded_normals = decoded.normals.empty() ? vertex_normals(decoded) : decoded.normals;
+    Sums forward = measure(source, source_normals, decoded_index, decoded_normals,
+                           keep_per_vertex ? &result.per_source_vertex : nullptr);
+    Sums backward = measure(decoded, decoded_normals, source_index, source_normals, nullptr);
+    result.forward = forward.result(), result.backward = backward.result();
+    forward.add(backward);
+    for (const Sample& sample : forward.samples) result.histogram.add(sample.distance, sample.weight);
+    const DirectedDistance both = forward.result();
+    result.mean = both.mean, result.p99 = both.p99, result.max = both.max, result.normal_degrees = both.normal_degrees;
+    return result;
+}
+
+}  // namespace rill::cooker

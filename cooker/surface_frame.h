@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// One source frame, prepared for sampling, tracking and fitting.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "mesh.h"
+
+namespace rill::cooker {
+
+/// A point of a surface: where, which way out, and how the fluid moves there (m/s).
+struct SurfacePoint {
+    glm::vec3 position{}, normal{}, velocity{};
+};
+
+/// Nearest-vertex queries over one mesh; immutable, thread safe.
+class VertexTree {
+public:
+    explicit VertexTree(const std::vector<glm::vec3>& points);  ///< keeps a reference
+    ~VertexTree();
+    struct Found {
+        uint32_t vertex;
+        float distance2;
+    };
+    /// Up to `count` nearest, ascending by distance (ties by index).
+    void nearest(const glm::vec3& x, size_t count, std::vector<Found>& out) const;
+    /// All within `radius`, ascending by vertex index.
+    void within(const glm::vec3& x, float radius, std::vector<Found>& out) const;
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Vertices in spatially coherent groups, for batched field evaluation.
+struct VertexGroup {
+    uint32_t first, count;  ///< into SurfaceFrame::order
+    glm::vec3 lower, upper;
+};
+
+struct SurfaceFrame {
+    explicit SurfaceFrame(Mesh mesh, float edge);
+    Mesh mesh;                      ///< normals filled in
+    std::vector<float> area;        ///< per vertex, m²
+    std::vector<uint32_t> order;    ///< vertices, grouped
+    std::vector<VertexGroup> groups;
+    VertexTree tree;
+    float edge;                     ///< median edge of the sequence, metres
+};
+
+/// Local least-squares quadratic of the source around x: the surface without its grid-scale noise.
+/// Only vertices within `radius` that face like `normal` count. Moves x along the normal onto the fitted
+/// patch and turns the normal. False where fewer than 4 vertices carry it (nothing there).
+bool settle(const SurfaceFrame& frame, float radius, SurfacePoint& point);
+
+}  // namespace rill::cooker

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+// What a set of points decodes to at the source's vertices, by the runtime's own field; and the correction of the
+// points by what is left: least-squares progressive iterative approximation (Deng & Lin 2014), which converges to
+// the least-squares fit of the blended surface to all source vertices without ever forming its system.
+#include <algorithm>
+#include <cmath>
+
+#include "parallel.h"
+#include "pipeline.h"
+#include "surface/field.h"
+
+namespace rill::cooker {
+namespace {
+
+/// The runtime's field over a vector of points, memory included.
+class PointField {
+public:
+    explicit PointField(const std::vector<SurfacePoint>& points, int jobs) {
+        const uint32_t n = uint32_t(points.size());
+        for (auto& row : rows_) row.resize(n);
+        for (uint32_t i = 0; i < n; ++i) {
+            for (int a = 0; a < 3; ++a) {
+                rows_[a][i] = points[i].position[a];
+                rows_[3 + a][i] = points[i].normal[a];
+                rows_[6 + a][i] = points[i].velocity[a];
+            }
+            rows_[9][i] = 1;
+        }
+        memory_.resize(surface::field_bytes(n, 0) + 64);
+        void* block = reinterpret_cast<void*>((reinterpret_cast<uintptr_t>(memory_.data()) + 63) & ~uintptr_t(63));
+        const format::PointSet set{n, rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), rows_[4].data(),
+                                   rows_[5].data(), rows_[6].data(), rows_[7].data(), rows_[8].data(), rows_[9].data()};
+        surface::begin_field(field, block, set, format::DropSet{});
+        constexpr uint32_t batch = 256;
+        parallel_for((field.point_count + batch - 1) / batch, jobs, [&](size_t part) {
+            surface::fit_patches(field, uint32_t(part) * batch, std::min(field.point_count, uint32_t(part + 1) * batch));
+        });
+        surface::finish_field(field);
+    }
+    surface::Field field;
+
+private:
+    std::vector<float> rows_[10];
+    std::vector<uint8_t> memory_;
+};
+
+struct TangentFrame {
+    glm::vec3 t1, t2;
+};
+TangentFrame tangent_frame(const glm::vec3& n) {
+    const glm::vec3 t1 = glm::normalize(glm::cross(n, std::fabs(n.z) < 0.9f ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0)));
+    return {t1, glm::cross(n, t1)};
+}
+
+}  // namespace
+
+SurfacePoint Path::target(int sample) const {
+    const size_t k = size_t(sample - birth);
+    SurfacePoint p = at[k];
+    const TangentFrame frame = tangent_frame(p.normal);
+    p.position += p.normal * correction[k];
+    p.normal = glm::normalize(p.normal + frame.t1 * tilt[k].x + frame.t2 * tilt[k].y);
+    return p;
+}
+
+Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, int jobs) {
+    Residual result;
+    result.distance.assign(frame.mesh.positions.size(), missing);
+    result.support.assign(points.size(), 0.f);
+    if (points.empty()) return result;
+    const PointField decoded(points, jobs);
+    const surface::Field& field = decoded.field;
+    for (uint32_t i = 0; i < field.point_count; ++i) result.support[field.source[i]] = field.support[i];
+    parallel_for(frame.groups.size(), jobs, [&](size_t g) {
+        const VertexGroup& group = frame.groups[g];
+        thread_local std::vector<uint32_t> candidates;
+        thread_local std::vector<float> x, y, z, value, gx, gy, gz;
+        candidates.resize(points.size());
+        for (auto* row : {&x, &y, &z, &value, &gx, &gy, &gz}) row->resize(group.count);
+        for (uint32_t i = 0; i < group.count; ++i) {
+            const glm::vec3& p = frame.mesh.positions[frame.order[group.first + i]];
+            x[i] = p.x, y[i] = p.y, z[i] = p.z;
+        }
+        const surface::Box box{{group.lower.x, group.lower.y, group.lower.z}, {group.upper.x, group.upper.y, group.upper.z}};
+        const uint32_t found = surface::gather(field, box, candidates.data(), uint32_t(candidates.size()));
+        surface::evaluate_gradient(field, candidates.data(), found, x.data(), y.data(), z.data(), group.count, value.data(),
+                                   gx.data(), gy.data(), gz.data(), nullptr);
+        for (uint32_t i = 0; i < group.count; ++i) {
+            if (value[i] >= surface::unsupported) continue;
+            const float slope = std::sqrt(gx[i] * gx[i] + gy[i] * gy[i] + gz[i] * gz[i]);
+            result.distance[frame.order[group.first + i]] = value[i] / std::max(slope, 0.3f);
+        }
+    });
+    return result;
+}
+
+Surplus measure_surplus(const std::vector<SurfacePoint>& points, int jobs) {
+    Surplus result;
+    result.distance.assign(points.size(), missing);
+    result.angle.assign(points.size(), 3.f);
+    if (points.empty()) return result;
+    const PointField decoded(points, jobs);
+    const surface::Field& field = decoded.field;
+    parallel_for((field.point_count + 255) / 256, jobs, [&](size_t part) {
+        std::vector<uint32_t> candidates(points.size());
+        for (uint32_t i = uint32_t(part) * 256; i < std::min(field.point_count, uint32_t(part + 1) * 256); ++i) {
+            const surface::Box box{{field.x[i], field.y[i], field.z[i]}, {field.x[i], field.y[i], field.z[i]}};
+            uint32_t found = surface::gather(field, box, candidates.data(), uint32_t(candidates.size()));
+            found = uint32_t(std::remove(candidates.begin(), candidates.begin() + found, i) - candidates.begin());
+            if (found < 4) continue;
+            float value, gx, gy, gz;
+            surface::evaluate_gradient(field, candidates.data(), found, &field.x[i], &field.y[i], &field.z[i], 1, &value, &gx,
+                                       &gy, &gz, nullptr);
+            const float slope = std::sqrt(gx * gx + gy * gy + gz * gz);
+            if (value >= surface::unsupported || !(slope > 0)) continue;
+            result.distance[field.source[i]] = std::fabs(value) / std::max(slope, 0.3f);
+            const float agree = (gx * field.nx[i] + gy * field.ny[i] + gz * field.nz[i]) / slope;
+            result.angle[field.source[i]] = std::acos(std::clamp(agree, -1.f, 1.f));
+        }
+    });
+    return result;
+}
+
+double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction) {
+    std::vector<std::pair<float, float>> weighted;
+    double total = 0, sum = 0;
+    for (size_t v = 0; v < residual.distance.size(); ++v) {
+        weighted.emplace_back(std::fabs(residual.distance[v]), frame.area[v]);
+        total += frame.area[v];
+    }
+    std::sort(weighted.begin(), weighted.end());
+    for (const auto& [distance, area] : weighted)
+        if ((sum += area) >= fraction * total) return distance;
+    return weighted.empty() ? 0 : weighted.back().first;
+}
+
+void correct_paths(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
+                   const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths) {
+    constexpr float reach = 0.6f;  // of the support
+    std::vector<VertexTree::Found> found;
+    for (size_t i = 0; i < points.size(); ++i) {
+        const float support = residual.support[i];
+        const SurfacePoint& p = points[i];
+        const TangentFrame tangents = tangent_frame(p.normal);
+        frame.tree.within(p.position, reach * support, found);
+        // Weighted plane through the residuals: offset and slope.
+        double w0 = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0, wr = 0, wxr = 0, wyr = 0;
+        for (const auto& [v, d2] : found) {
+            const float r = residual.distance[v];
+            if (std::fabs(r) > credible || glm::dot(frame.mesh.normals[v], p.normal) < 0.3f) continue;
+            const double u = std::sqrt(d2) / support, w = frame.area[v] * (1 - u) * (1 - u) / (u * u + 0.05);
+            const glm::vec3 d = frame.mesh.positions[v] - p.position;
+            const double x = glm::dot(d, tangents.t1), y = glm::dot(d, tangents.t2);
+            w0 += w, wx += w * x, wy += w * y, wxx += w * x * x, wxy += w * x * y, wyy += w * y * y;
+            wr += w * r, wxr += w * x * r, wyr += w * y * r;
+        }
+        if (!(w0 > 0)) continue;
+        const double mx = wx / w0, my = wy / w0, mr = wr / w0, ridge = 0.05 * support * support;
+        const double xx = wxx / w0 - mx * mx + ridge, yy = wyy / w0 - my * my + ridge, xy = wxy / w0 - mx * my;
+        const double xr = wxr / w0 - mx * mr, yr = wyr / w0 - my * mr, determinant = xx * yy - xy * xy;
+        const double gx = (xr * yy - yr * xy) / determinant, gy = (yr * xx - xr * xy) / determinant;
+        Path& path = paths[ids[i]];
+        const size_t k = size_t(sample - path.birth);
+        const float limit = 0.3f * support;
+        path.correction[k] = std::clamp(path.correction[k] + float(mr - gx * mx - gy * my), -limit, limit);
+        path.tilt[k] = glm::clamp(path.tilt[k] - glm::vec2(float(gx), float(gy)), -0.5f, 0.5f);
+    }
+}
+
+}  // namespace rill::cooker

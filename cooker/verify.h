@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// An asset against the sequence it was cooked from, frame by frame, as the runtime shows it.
+#pragma once
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "readers/reader.h"
+#include "surface_distance.h"
+
+namespace rill::cooker {
+
+struct FrameMeasure {
+    int number = 0;              ///< the source's
+    double seconds = 0;          ///< after the asset's first frame
+    uint32_t source_triangles = 0, decoded_triangles = 0;
+    double edge = 0;             ///< median edge of the source frame, metres
+    SurfaceDistance distance;
+    Topology source, decoded;
+    double volume_ratio() const; ///< decoded / source; 1 when both are empty
+};
+struct Verification {
+    std::string asset, input;
+    std::vector<FrameMeasure> frames;
+    double diagonal = 0;         ///< of the asset's bounds, metres
+    double edge = 0;             ///< the source's median edge as the asset states it, metres
+    std::string target;          ///< the asset's own --error; empty when it states none
+    double target_p99 = 0;       ///< metres; 0 when it states none
+    double mean = 0, p99 = 0, max = 0;  ///< metres, over the surface of all frames together
+    double normal_degrees = 0;
+    double bytes_per_frame = 0;
+    size_t worst = 0;            ///< index of the frame with the largest p99
+    bool target_met() const { return target_p99 == 0 || p99 <= target_p99 * target_slack; }
+    static constexpr double target_slack = 1.1;
+};
+/// The frames of `asset` (or of `read`'s range, if it has one) out of `input`. Throws InputError when either
+/// cannot be read or the input lacks one.
+std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read);
+/// Every frame of the source against the asset. Throws InputError when the asset lacks one. jobs 0: all cores.
+Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
+                    const std::function<void(uint32_t done, uint32_t total)>& progress = {});
+
+/// What the cook's closed loop asks.
+struct VerifySummary {
+    double p99 = 0;       ///< metres, over the surface of all frames
+    nlohmann::json json;  ///< to_json() without the list of frames
+};
+VerifySummary verify_asset(const std::string& asset, const SequenceReader& source, int jobs,
+                           const std::function<void(uint32_t done)>& progress);
+/// Documented in cooker/README.md.
+nlohmann::json to_json(const Verification& verification);
+/// One self-contained page: figures, graphs, and the worst frames beside those of the source.
+std::string to_html(const Verification& verification, const SequenceReader& source);
+
+}  // namespace rill::cooker

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Frames back out, for other programs.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "mesh.h"
+
+namespace rill::cooker {
+
+/// Writes by extension: .ply (binary little endian, nx ny nz, vx vy vz), .obj (no velocity), .glb (POSITION,
+/// NORMAL, _VELOCITY). Absent attributes are left out. Throws UsageError for other extensions, InputError
+/// when the file cannot be written; it appears complete or not at all.
+void write_frame(const std::filesystem::path& path, const Mesh& mesh);
+/// Throws UsageError unless write_frame() knows the extension.
+void check_frame_extension(const std::filesystem::path& path);
+
+/// `frame_%04d.ply`, 7 → `frame_0007.ply`. Throws UsageError when there is more than one place for a number.
+std::string number_pattern(const std::string& pattern, int number);
+bool has_number_place(const std::string& pattern);
+
+std::string to_ply(const Mesh& mesh);
+std::string to_obj(const Mesh& mesh);
+std::string to_glb(const Mesh& mesh);
+
+}  // namespace rill::cooker

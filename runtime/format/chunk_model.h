@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// What the bits of a chunk mean, written once for both directions: Coder::bit(probability, value) encodes
+// `value` and returns it, or ignores it and returns the decoded bit. The decoder and the encoder therefore
+// see the same contexts by construction.
+//
+// A chunk is: LatticeSteps (22 bytes), then range-coded points, then drops. Each set is a count-coded k-d
+// tree over lattice points (Devillers & Gandoin 2000), whose leaves, in Morton order, carry their track at
+// once, so that everything decoded before helps with what comes next. See FORMAT.md, "Chunk".
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "format/entropy_decoder.h"
+#include "format/fourier_extension.h"
+#include "format/lattice.h"
+
+namespace rill::format {
+
+/// What Coder::category() is told: where the next bits are spent.
+enum BitCategory : int { bits_structure, bits_births, bits_motion, bits_normals, bits_drops };
+
+/// Magnitude class: 0, 1, 2, 3–4, 5–8, 9–16 …
+inline uint32_t magnitude_class(uint32_t m) {
+    if (m <= 2) return m;
+    uint32_t c = 2;
+    for (m = (m - 1) >> 1; m > 0; m >>= 1) ++c;
+    return c;
+}
+inline uint32_t at_most(uint32_t value, uint32_t limit) { return value < limit ? value : limit; }
+inline uint32_t magnitude(int32_t v) { return v < 0 ? 0u - uint32_t(v) : uint32_t(v); }
+inline int64_t rounded_division(int64_t a, int64_t b) {
+    if (b < 0) a = -a, b = -b;
+    return (a >= 0 ? a + b / 2 : a - b / 2) / b;
+}
+
+/// What is being coded by a signed value.
+enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, along, axis_delta, kinds };
+
+/// All that adapts while a chunk is coded.
+struct Statistics {
+    static constexpr uint32_t bins = 9;  ///< of a value: zero, sign, unary magnitude class up to 8
+    static constexpr uint32_t contexts[Mixer::inputs] = {12, 49, 40, 48};  ///< per kind
+    static constexpr uint32_t all_contexts = 12 + 49 + 40 + 48;
+    static constexpr uint32_t more_contexts = 72, leaf_contexts = 78;
+
+    Counter values[kinds * all_contexts * bins];
+    Counter mantissa[kinds][24], escape[24];
+    Counter split_small[9][9], split_empty[2][16], split_tree[8][16];
+    Counter leaf[Mixer::inputs][leaf_contexts];
+    Counter flag[4][12], birth[128], death[128], same_birth[2], same_death[2];
+    Counter more[4][Mixer::inputs][more_contexts];
+    Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4];
+    /// How far predictions were right: Σ value · prediction / Σ prediction².
+    struct Trust {
+        int64_t product = 1 << 17, square = 1 << 18;
+    } trust[kinds][6];
+};
+
+template <class Coder>
+class ChunkModel {
+public:
+    ChunkModel(Coder& coder, const LatticeSteps& steps, uint32_t sample_count, Statistics& learned,
+               TrackBlock& block)
+        : learned_(learned),
+          coder_(coder),
+          steps_(steps),
+          samples_(sample_count),
+          levels_(axis_levels(steps)),
+          block_(block) {}
+
+    /// Codes one of the two sets, tracks [first, first + count) of the block. `source(i)` gives the encoder's
+    /// i-th track in Morton order; the decoder's returns null. False: the bytes are not a chunk (`reason`).
+    template <class Source>
+    bool code_set(bool drops, uint32_t first, uint32_t count, const int32_t (&low)[3],
+                  const uint8_t (&bits)[3], const Source& source);
+    const char* reason = nullptr;
+    uint32_t coefficients_used() const { return used_; }
+    /// Raw bits at even odds.
+    uint32_t raw(uint32_t bits, uint32_t value) {
+        uint32_t out = 0;
+        for (uint32_t b = bits; b-- > 0;) out = out << 1 | coder_.bit(32768, value >> b & 1);
+        return out;
+    }
+
+private:
+    // ---- symbols -----------------------------------------------------------------------------------
+    using Contexts = std::array<uint32_t, Mixer::inputs>;
+
+    uint32_t bit(Mixer& mixer, Counter* a, Counter* b, Counter* c, Counter* d, uint32_t value) {
+        return mixed_bit(coder_, mixer, {a, b, c, d}, value);
+    }
+    uint32_t bit(Counter& counter, uint32_t value) {
+        const uint32_t p = counter.probability;
+        const uint32_t out = coder_.bit(p < 64 ? 64 : p > 65472 ? 65472 : p, value);
+        learn(counter, out);
+        return out;
+    }
+    uint32_t tree(Counter* counters, uint32_t bits, uint32_t value) {
+        uint32_t node = 1;
+        for (uint32_t b = bits; b-- > 0;) node = node << 1 | bit(counters[node], value >> b & 1);
+        return node - (1u << bits);
+    }
+    /// Signed integer under four contexts (each below contexts_per_input).
+    int32_t signed_value(Kind kind, const Contexts& context, int32_t value) {
+        uint32_t base = kind, slot[Mixer::inputs], offset = 0;
+        for (uint32_t i = 0; i < Mixer::inputs; ++i) {
+            slot[i] = (offset + base * Statistics::contexts[i] + context[i]) * Statistics::bins;
+            offset += uint32_t(kinds) * Statistics::contexts[i];
+        }
+        const auto coded = [&](uint32_t bin, uint32_t v) {
+            return bit(learned_.value_mixer[kind][bin], &learned_.values[slot[0] + bin],
+                       &learned_.values[slot[1] + bin], &learned_.values[slot[2] + bin],
+                       &learned_.values[slot[3] + bin], v);
+        };
+        const uint32_t wanted = magnitude(value);
+        if (!coded(0, wanted != 0)) return 0;
+        const uint32_t negative = coded(1, value < 0);
+        const uint32_t wanted_class = magnitude_class(wanted);
+        uint32_t c = 1;
+        while (c < 21) {  // 2^20 and below
+            const uint32_t more = wanted_class > c;
+            if (!(c + 1 < Statistics::bins ? coded(c + 1, more) : bit(learned_.escape[c], more))) break;
+            ++c;
+        }
+        uint32_t m = c;
+        if (c > 2) {
+            const uint32_t bits = c - 2, floor = (1u << bits) + 1, rest = wanted - floor;
+            const uint32_t top = bit(learned_.mantissa[kind][c], rest >> (bits - 1) & 1);
+            m = floor + (top << (bits - 1) | raw(bits - 1, rest & ((1u << (bits - 1)) - 1)));
+        }
+        return negative ? -int32_t(m) : int32_t(m);
+    }
+
+    // ---- neighbours --------------------------------------------------------------------------------
+    static constexpr uint32_t window = 128, nearest = 3;
+    struct Near {
+        uint32_t count = 0;
+        uint32_t track[nearest];
+        int64_t distance[nearest];   ///< squared, step/16
+        int64_t mean[nearest][3];    ///< positions, step/16
+        int32_t normal[nearest][3];  ///< of points, in 1/16384
+    };
+    void mean_of(uint32_t track, int64_t (&out)[3]) const {
+        const float* at = block_.coefficients + block_.tracks[track].first_coefficient;
+        for (int c = 0; c < 3; ++c) out[c] = load(at + c);
+    }
+    void normal_of(uint32_t track, int32_t (&out)[3]) const {
+        const Track& t = block_.tracks[track];
+        const float* at = block_.coefficients + t.first_coefficient + 3 * t.position_terms;
+        const int32_t axis[2] = {load(at), load(at + 1)};
+        const Frame frame = frame_of(axis, levels_);
+        for (int c = 0; c < 3; ++c) out[c] = frame.row[2][c];
+    }
+    /// The nearest tracks among the last ones of this set; `like`: only those that share its life and basis.
+    Near find_near(uint32_t index, const int64_t (&x)[3], const RawTrack* like) const {
+        Near near;
+        const uint32_t from = index - first_ > window ? index - window : first_;
+        for (uint32_t i = index; i-- > from;) {
+            const Track& t = block_.tracks[i];
+            if (like && (t.birth != like->birth || t.death != like->death ||
+                         ((t.flags ^ like->flags) & track_cosine)))
+                continue;
+            int64_t y[3], d = 0;
+            mean_of(i, y);
+            for (int c = 0; c < 3; ++c) d += (x[c] - y[c]) * (x[c] - y[c]) / 256;
+            if (d > int64_t(1) << 50) d = int64_t(1) << 50;
+            uint32_t at = near.count;
+            if (at == nearest && d >= near.distance[at - 1]) continue;
+            if (at == nearest)
+                --at;
+            else
+                ++near.count;
+            for (; at > 0 && d < near.distance[at - 1]; --at)
+                near.distance[at] = near.distance[at - 1], near.track[at] = near.track[at - 1];
+            near.distance[at] = d, near.track[at] = i;
+        }
+        for (uint32_t j = 0; j < near.count && !like; ++j) {
+            mean_of(near.track[j], near.mean[j]);
+            if (!drops_) normal_of(near.track[j], near.normal[j]);
+        }
+        return near;
+    }
+
+    // ---- parts of a track --------------------------------------------------------------------------
+    struct Box {
+        int32_t low[3];
+        uint8_t bits[3];
+        uint32_t count;
+    };
+    uint32_t split_count(uint32_t n, uint32_t value);
+    void leaf(Box& box, const RawTrack* source);
+    uint32_t leaf_bit(const Box& box, uint32_t dimension, const Near& near, uint32_t value);
+    bool track(uint32_t index, const Box& box, const RawTrack* source);
+    bool life(RawTrack& t, const Near& near, const RawTrack* source);
+    bool axis(RawTrack& t, const Near& near, const RawTrack* source);
+    void along_axis(RawTrack& t, const Frame& frame, const Near& near, const RawTrack* source);
+    bool series(RawTrack& t, const Frame& frame, bool second, const Near& near, const Near& like,
+                const RawTrack* source);
+    int64_t turned_value(const RawTrack& t, const Frame& frame, bool second, uint32_t other, uint32_t k,
+                         uint32_t c) const;
+    bool term(const RawTrack& t, const Frame& frame, bool second, const Near& like, uint32_t k,
+              int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted, int32_t* out);
+
+    Statistics& learned_;
+    Coder& coder_;
+    const LatticeSteps& steps_;
+    uint32_t samples_;
+    int32_t levels_;
+    TrackBlock& block_;
+    uint32_t first_ = 0, done_ = 0, used_ = 0;
+    bool drops_ = false;
+};
+
+#include "format/chunk_model_parts.h"
+
+}  // namespace rill::format

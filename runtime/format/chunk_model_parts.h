@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: MIT
+// The parts of ChunkModel, included by chunk_model.h inside its namespace.
+
+/// How many of the box's points lie in its lower half.
+template <class Coder>
+uint32_t ChunkModel<Coder>::split_count(uint32_t n, uint32_t value) {
+    if (n <= 8) {  // unary from the bottom: P(value = v | value ≥ v)
+        uint32_t v = 0;
+        while (v < n && bit(learned_.split_small[n][v], value > v)) ++v;
+        return v;
+    }
+    uint32_t size = 0;
+    while (n >> size > 8) ++size;
+    size = at_most(size, 15);
+    if (bit(learned_.split_empty[0][size], value == 0)) return 0;
+    if (bit(learned_.split_empty[1][size], value == n)) return n;
+    // A sixteenth of the range, then what is left at even odds.
+    const uint64_t range = n - 1;  // values 1 … n − 1
+    const uint32_t part =
+        tree(learned_.split_tree[at_most(size, 7)], 4, uint32_t((uint64_t(value - 1) * 16) / range) & 15);
+    const uint32_t low = uint32_t((part * range + 15) / 16), high = uint32_t(((part + 1) * range + 15) / 16);
+    uint32_t bits = 0;
+    while (1u << bits < high - low) ++bits;
+    const uint32_t rest = raw(bits, value - 1 - low);
+    return 1 + at_most(low + rest, n - 2);
+}
+
+/// Which half of a box its only point is in: where the planes of the nearest points pass.
+template <class Coder>
+uint32_t ChunkModel<Coder>::leaf_bit(const Box& box, uint32_t dimension, const Near& near, uint32_t value) {
+    const uint32_t level = box.bits[dimension];
+    const int64_t quarter =
+        (int64_t(steps_.ratio) << level) / 4;  // from the centre to that of a half, step/16
+    uint32_t side = 0, steep = 0, far = 0, away = 0;
+    if (near.count && !drops_) {
+        int64_t centre[3], height = 0, slope = 0;
+        for (int c = 0; c < 3; ++c)
+            centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
+        for (uint32_t j = 0; j < near.count; ++j) {
+            const int64_t* y = near.mean[j];
+            for (int c = 0; c < 3; ++c) height += (centre[c] - y[c]) * near.normal[j][c] / 16384;
+            slope += near.normal[j][dimension];
+            if (j == 0) {
+                const int64_t offset = rounded_division(2 * (y[dimension] - centre[dimension]), quarter);
+                away = uint32_t(offset < -4 ? 0 : offset > 4 ? 8 : offset + 4);
+            }
+        }
+        height /= near.count, slope /= near.count;
+        const int64_t steepness = slope < 0 ? -slope : slope;
+        steep = steepness > 13000 ? 3 : steepness > 8000 ? 2 : steepness > 3000 ? 1 : 0;
+        // The plane crosses this axis at −height / slope from the centre.
+        const int64_t crossing = steepness < 500 ? 0 : rounded_division(-height * 16384 * 2, slope * quarter);
+        side = uint32_t(crossing < -6 ? 0 : crossing > 6 ? 12 : crossing + 6);
+        uint64_t ratio = uint64_t(near.distance[0]) / uint64_t(quarter * quarter / 64 + 1);
+        while (ratio > 1 && far < 5) ratio >>= 2, ++far;
+    }
+    const uint32_t low = at_most(level, 6) - 1;
+    return bit(learned_.leaf_mixer[dimension], &learned_.leaf[0][steep * 13 + side],
+               &learned_.leaf[1][side * 6 + low], &learned_.leaf[2][side * 6 + far],
+               &learned_.leaf[3][away * 6 + far], value);
+}
+
+/// The remaining bits of a box with one point, largest dimension first.
+template <class Coder>
+void ChunkModel<Coder>::leaf(Box& box, const RawTrack* source) {
+    const uint32_t index = first_ + done_;
+    int64_t centre[3];
+    for (int c = 0; c < 3; ++c)
+        centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
+    const Near near = find_near(index, centre, nullptr);
+    for (;;) {
+        uint32_t d = 0;
+        for (uint32_t c = 1; c < 3; ++c)
+            if (box.bits[c] > box.bits[d]) d = c;
+        if (box.bits[d] == 0) return;
+        const int32_t half = 1 << (box.bits[d] - 1);
+        const uint32_t upper = leaf_bit(box, d, near, source ? source->lattice[d] >= box.low[d] + half : 0);
+        if (upper) box.low[d] += half;
+        --box.bits[d];
+    }
+}
+
+/// Birth, death, flags.
+template <class Coder>
+bool ChunkModel<Coder>::life(RawTrack& t, const Near& near, const RawTrack* source) {
+    const Track* like = near.count ? &block_.tracks[near.track[0]] : nullptr;
+    const uint32_t last = samples_ - 1, set = drops_ ? 6 : 0;
+    const uint32_t context = like ? 1 + (like->flags & 3) : 0;
+    t.flags = 0;
+    const uint32_t wanted = source ? source->flags : 0;
+    if (bit(learned_.flag[0][set + context], wanted & track_born)) t.flags |= track_born;
+    if (bit(learned_.flag[1][set + context], (wanted & track_dies) != 0)) t.flags |= track_dies;
+    const uint32_t born = t.flags & track_born, dies = (t.flags & track_dies) / track_dies;
+
+    const uint32_t likely_birth = like && (like->flags & 1u) == born ? like->birth : 0;
+    if (bit(learned_.same_birth[born], source && source->birth == likely_birth))
+        t.birth = uint8_t(likely_birth);
+    else
+        t.birth = uint8_t(tree(learned_.birth, 7, source ? source->birth : 0));
+    const uint32_t likely_death = like && (like->flags / 2 & 1u) == dies ? like->death : last;
+    if (bit(learned_.same_death[dies], source && source->death == likely_death))
+        t.death = uint8_t(likely_death);
+    else
+        t.death = uint8_t(tree(learned_.death, 7, source ? source->death : 0));
+    if (t.birth > t.death || t.death > last) {
+        reason = "a track lives outside its window";
+        return false;
+    }
+    const uint32_t length = t.death - t.birth + 1u;
+    if (length > 2 && bit(learned_.flag[2][set + (like ? 1 + (like->flags & track_cosine ? 1 : 0) : 0)],
+                          (wanted & track_cosine) != 0))
+        t.flags |= track_cosine;
+    if (!drops_ && bit(learned_.flag[3][0], (wanted & track_fine) != 0)) t.flags |= track_fine;
+    return true;
+}
+
+/// Mean normal, against that of the nearest tracks, in the half of the octahedron theirs is in.
+template <class Coder>
+bool ChunkModel<Coder>::axis(RawTrack& t, const Near& near, const RawTrack* source) {
+    int64_t sum[3] = {0, 0, 1};
+    uint32_t spread = 0;
+    for (uint32_t j = 0; j < near.count; ++j) {
+        const int64_t weight = 1 + 1024 * (near.distance[0] + 1) / (near.distance[j] + 1);
+        for (int c = 0; c < 3; ++c) sum[c] += weight * near.normal[j][c];
+        if (j == 1) {
+            int64_t difference = 0;
+            for (int c = 0; c < 3; ++c) {
+                const int64_t d = near.normal[1][c] - near.normal[0][c];
+                difference += d * d;
+            }
+            int64_t unit = int64_t(16384 / levels_) * (16384 / levels_) / 2 + 1;
+            for (difference /= unit; difference > 0 && spread < 6; difference >>= 2) ++spread;
+        }
+    }
+    spread = near.count < 2 ? 0 : 1 + spread;
+    const bool below = sum[2] < 0;
+    if (below) sum[2] = -sum[2];
+    int32_t guess[2], wanted[2] = {0, 0};
+    nearest_axis(sum, levels_, guess);
+    const auto flip = [&](int32_t(&a)[2]) {  // mirrors the direction in z = 0: exact on the integers
+        const int32_t u = (levels_ - int32_t(magnitude(a[1]))) * (a[0] < 0 ? -1 : 1);
+        a[1] = (levels_ - int32_t(magnitude(a[0]))) * (a[1] < 0 ? -1 : 1);
+        a[0] = u;
+    };
+    if (source) wanted[0] = source->axis[0], wanted[1] = source->axis[1];
+    if (below && source) flip(wanted);
+    uint32_t previous = 0;
+    for (uint32_t c = 0; c < 2; ++c) {
+        const Contexts context = {c, spread, 8 * c + spread, 6 * c + at_most(magnitude_class(previous), 5)};
+        const int32_t delta = signed_value(axis_delta, context, wanted[c] - guess[c]);
+        previous = magnitude(delta);
+        t.axis[c] = guess[c] + delta;
+        if (magnitude(t.axis[c]) > uint32_t(levels_)) return false;
+    }
+    if (below) flip(t.axis);
+    return true;
+}
+
+/// From the lattice point to the surface: a circle through a neighbour whose two normals are known.
+template <class Coder>
+void ChunkModel<Coder>::along_axis(RawTrack& t, const Frame& frame, const Near& near,
+                                   const RawTrack* source) {
+    int64_t guess = 0, weights = 0, least = 0, most = 0;
+    for (uint32_t j = 0; j < near.count; ++j) {
+        int64_t height = 0, along = 0;
+        for (int c = 0; c < 3; ++c) {
+            const int64_t both = frame.row[2][c] + near.normal[j][c];
+            height += (near.mean[j][c] - int64_t(t.lattice[c]) * steps_.ratio) * both;
+            along += int64_t(frame.row[2][c]) * both / 16384;
+        }
+        if (along < 8000) continue;                              // more than about 120° apart: another sheet
+        const int64_t offset = rounded_division(height, along);  // step/16
+        const int64_t weight = 1 + 1024 * (near.distance[0] + 1) / (near.distance[j] + 1);
+        guess += weight * offset, weights += weight;
+        least = weights == weight || offset < least ? offset : least;
+        most = weights == weight || offset > most ? offset : most;
+    }
+    guess = weights ? rounded_division(guess, weights) : 0;
+    const int64_t reach = steps_.ratio;  // the nearest lattice point is nearer than this
+    const bool wild = guess > reach || guess < -reach;
+    if (wild) guess = 0;
+    const int32_t likely = int32_t(rounded_division(guess, 16));
+    const int64_t range = (most - least) / 8;
+    const uint32_t spread =
+        wild || !weights ? 0 : 1 + at_most(magnitude_class(range < 1000 ? uint32_t(range) : 1000), 6);
+    const Contexts context = {spread,
+                              uint32_t(likely < -8  ? 0
+                                       : likely > 8 ? 16
+                                                    : likely + 8),
+                              at_most(near.count, 3) * 8 + spread, 0};
+    t.position[0][2] = likely + signed_value(along, context, source ? source->position[0][2] - likely : 0);
+    for (uint32_t c = 0; c < 2; ++c)
+        t.position[0][c] = t.flags & track_fine
+                               ? signed_value(along, {8 + c, 20, 33, 1}, source ? source->position[0][c] : 0)
+                               : 0;
+}
+
+/// The time coefficients of one channel group, term by term, predicted from like-lived neighbours.
+template <class Coder>
+bool ChunkModel<Coder>::series(RawTrack& t, const Frame& frame, bool second, const Near& near,
+                               const Near& like, const RawTrack* source) {
+    const uint32_t channels = drops_ && second ? 6 : 3, start = drops_ && second ? 0 : 1;
+    const uint32_t group = drops_ * 2u + second;
+    const uint32_t limit = most_terms(t.death - t.birth + 1u, (t.flags & track_cosine) != 0);
+    const uint32_t wanted_terms = source ? (second ? source->second_terms : source->position_terms) : 0;
+    uint32_t terms = start, like_terms = 0;
+    for (uint32_t j = 0; j < like.count; ++j) {
+        const Track& other = block_.tracks[like.track[j]];
+        like_terms += second ? other.second_terms : other.position_terms;
+    }
+    if (like.count) like_terms = (2 * like_terms + like.count) / (2 * like.count);
+    int32_t none[6] = {}, previous[6] = {}, before[6] = {};
+    for (uint32_t k = start; k < limit; ++k) {
+        uint32_t activity = 0, older = 0;
+        for (uint32_t c = 0; c < channels; ++c)
+            activity += magnitude(previous[c]), older += magnitude(before[c]);
+        const uint32_t place = at_most(k, 11);
+        const uint32_t expected = like.count ? 1 + at_most(like_terms > k ? like_terms - k : 0, 4) : 0;
+        const uint32_t now = at_most(magnitude_class(activity), 5), past = at_most(magnitude_class(older), 4);
+        const uint32_t positions = second ? at_most(t.position_terms > k ? t.position_terms - k : 0, 4) : 5;
+        if (!bit(learned_.more_mixer[group], &learned_.more[group][0][place * 6 + expected],
+                 &learned_.more[group][1][now * 5 + past], &learned_.more[group][2][now * 6 + expected],
+                 &learned_.more[group][3][positions * 12 + place], wanted_terms > k))
+            break;
+        terms = k + 1;
+        int32_t* out = second ? t.second[k] : t.position[k];
+        const int32_t* wanted = source ? (second ? source->second[k] : source->position[k]) : none;
+        if (!term(t, frame, second, k > 1 ? like : near, k, previous, before, wanted, out)) return false;
+    }
+    (second ? t.second_terms : t.position_terms) = uint8_t(terms < 1 ? 1 : terms);
+    return true;
+}
+
+/// Coefficient k of another track in this one's frame and scale, channel c, in 1/256. Lives may differ for k = 1,
+/// the straight part: there the coefficient of a velocity grows as √(n² − 1) with the number of samples n.
+template <class Coder>
+int64_t ChunkModel<Coder>::turned_value(const RawTrack& t, const Frame& frame, bool second, uint32_t other,
+                                        uint32_t k, uint32_t c) const {
+    const Track& from = block_.tracks[other];
+    if (k >= (second ? from.second_terms : from.position_terms) || ((from.flags ^ t.flags) & track_cosine))
+        return 0;
+    const float* at =
+        block_.coefficients + from.first_coefficient + (second ? 3 * from.position_terms : 0) + 3 * k;
+    int64_t turned = 0;
+    for (int d = 0; d < 3; ++d) turned += int64_t(load(at + d)) * frame.row[c][d];
+    const int64_t ratio = second || drops_ || c == 2 || (t.flags & track_fine) ? 16 : steps_.ratio;
+    turned = turned / 16384 * 16 / ratio;
+    const int64_t life = t.death - t.birth + 1, other_life = from.death - from.birth + 1;
+    if (life == other_life) return turned;
+    return turned * square_root((life * life - 1) * 65536 / (other_life * other_life - 1)) / 256;
+}
+
+template <class Coder>
+bool ChunkModel<Coder>::term(const RawTrack& t, const Frame& frame, bool second, const Near& like, uint32_t k,
+                             int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted,
+                             int32_t* out) {
+    const uint32_t channels = drops_ && second ? 6 : 3;
+    uint32_t others = 0;
+    int32_t residual[6] = {};
+    for (uint32_t i = 0; i < channels; ++i) {
+        const uint32_t c = channels == 3 ? (i + 2) % 3 : i;  // along the normal first
+        const Kind kind = drops_   ? (second ? drop_shape : drop_path)
+                          : second ? (c == 2 ? turn_axis : turn)
+                                   : (c == 2 ? normal : tangent);
+        int64_t sum = 0, least = 0, most = 0;  // 1/256
+        if (channels == 3)
+            for (uint32_t j = 0; j < like.count; ++j) {
+                const int64_t turned = turned_value(t, frame, second, like.track[j], k, c);
+                sum += turned;
+                least = j == 0 || turned < least ? turned : least;
+                most = j == 0 || turned > most ? turned : most;
+            }
+        const int64_t mean = like.count ? sum / like.count : 0;
+        Statistics::Trust& trust = learned_.trust[kind][at_most(k, 5)];
+        int64_t factor = trust.product * 256 / (trust.square + 1);
+        factor = factor < 0 ? 0 : factor > 256 ? 256 : factor;
+        const int32_t guess = int32_t(rounded_division(mean * factor, 65536));
+        const uint32_t size =
+            at_most(magnitude_class(at_most(uint32_t((mean < 0 ? -mean : mean) / 64), 1u << 20)), 7);
+        const uint32_t spread =
+            like.count == 0 ? 0
+            : like.count == 1
+                ? 1 + at_most(size / 3, 1)
+                : 3 + at_most(magnitude_class(at_most(uint32_t((most - least) / 64), 1u << 20)), 7);
+        const Contexts context = {
+            at_most(k, 11),
+            at_most(magnitude_class(magnitude(previous[c]) * 2 + magnitude(before[c])), 6) * 7 +
+                at_most(magnitude_class(others), 6),
+            spread * 3 + at_most(k / 2, 2),
+            size * 6 + at_most(magnitude_class(magnitude(previous[c]) + others), 5)};
+        const int32_t value = signed_value(kind, context, wanted[c] - guess);
+        residual[c] = value;
+        out[c] = value + guess;
+        if (magnitude(out[c]) > uint32_t(max_symbol)) {
+            reason = "a coefficient is out of range";
+            return false;
+        }
+        others += magnitude(value);
+        if (mean) {
+            const int64_t seen = out[c] < -32768 ? -32768 : out[c] > 32768 ? 32768 : out[c];
+            const int64_t said = mean < -(1 << 23) ? -(1 << 23) : mean > 1 << 23 ? 1 << 23 : mean;
+            trust.product += (seen * said * 256 - trust.product) / 32;
+            trust.square += (said * said - trust.square) / 32;
+        }
+    }
+    for (uint32_t c = 0; c < channels; ++c) before[c] = previous[c], previous[c] = residual[c];
+    return true;
+}
+
+template <class Coder>
+bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* source) {
+    RawTrack t;
+    coder_.category(drops_ ? bits_drops : bits_structure);
+    int64_t x[3];
+    for (int c = 0; c < 3; ++c) {
+        t.lattice[c] = box.low[c];
+        x[c] = int64_t(box.low[c]) * steps_.ratio;
+        t.position[0][c] = t.second[0][c] = t.second[0][c + 3] = 0;
+    }
+    const Near near = find_near(index, x, nullptr);
+    if (!life(t, near, source)) return false;
+    Frame frame = identity_frame;
+    t.axis[0] = t.axis[1] = 0;
+    if (drops_) {
+        for (uint32_t c = 0; c < 3; ++c)
+            t.position[0][c] = signed_value(drop_path, {0, 0, 0, 0}, source ? source->position[0][c] : 0);
+    } else {
+        coder_.category(bits_births);
+        if (!axis(t, near, source)) {
+            reason = "a normal is out of range";
+            return false;
+        }
+        frame = frame_of(t.axis, levels_);
+        along_axis(t, frame, near, source);
+    }
+    const Near like = find_near(index, x, &t);
+    if (!drops_) coder_.category(bits_motion);
+    if (!series(t, frame, false, near, like, source)) return false;
+    if (!drops_) coder_.category(bits_normals);
+    if (!series(t, frame, true, near, like, source)) return false;
+    const uint32_t size = coefficients_of(t, drops_);
+    if (size > block_.coefficient_count - used_) {
+        reason = "more coefficients than the directory says";
+        return false;
+    }
+    if (!place_track(t, steps_, drops_, block_, index, used_)) {
+        reason = "a value is out of range";
+        return false;
+    }
+    used_ += size;
+    return true;
+}
+
+template <class Coder>
+template <class Source>
+bool ChunkModel<Coder>::code_set(bool drops, uint32_t first, uint32_t count, const int32_t (&low)[3],
+                                 const uint8_t (&bits)[3], const Source& source) {
+    drops_ = drops, first_ = first, done_ = 0;
+    if (count == 0) return true;
+    Box stack[3 * 31 + 2];
+    uint32_t height = 0;
+    stack[height++] = {{low[0], low[1], low[2]}, {bits[0], bits[1], bits[2]}, count};
+    while (height > 0) {
+        Box box = stack[--height];
+        coder_.category(drops ? bits_drops : bits_births);
+        if (coder_.exhausted()) {
+            reason = "the chunk ends too early";
+            return false;
+        }
+        uint32_t d = 0;
+        for (uint32_t c = 1; c < 3; ++c)
+            if (box.bits[c] > box.bits[d]) d = c;
+        if (box.count == 1 || box.bits[d] == 0) {
+            if (box.count == 1) leaf(box, source(done_));
+            for (; box.count > 0; --box.count) {
+                if (coder_.exhausted()) break;
+                if (!track(first_ + done_, box, source(done_))) return false;
+                ++done_;
+            }
+            continue;
+        }
+        const int32_t half = 1 << (box.bits[d] - 1);
+        uint32_t below = 0;
+        if (source(done_))
+            while (below < box.count && source(done_ + below)->lattice[d] < box.low[d] + half) ++below;
+        below = split_count(box.count, below);
+        --box.bits[d];
+        Box upper = box;
+        upper.low[d] += half;
+        upper.count = box.count - below, box.count = below;
+        if (upper.count) stack[height++] = upper;  // depth first, lower half first: Morton order
+        if (box.count) stack[height++] = box;
+    }
+    if (done_ != count) {
+        reason = "the chunk ends too early";
+        return false;
+    }
+    return true;
+}

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// The lattice that tracks are quantised on: integer frames from integer axes, and the integers of a track
+// turned to asset axes. All integer, so that prediction is the same on every machine; floats come last.
+#pragma once
+#include <cstdint>
+#include <cstring>
+
+#include "format/layout.h"
+#include "format/tracks.h"
+
+namespace rill::format {
+
+/// Quantiser steps as the chunk head holds them. 22 bytes: step, normal_step, origin as binary32, ratio.
+struct LatticeSteps {
+    float step;         ///< normal direction, metres
+    float normal_step;  ///< normals, radians
+    float origin[3];
+    uint16_t ratio;  ///< tangential step / step, in 1/16: 16 … 1024
+};
+inline constexpr uint32_t lattice_steps_bytes = 22;
+/// Finite, positive, ratio in range; says nothing else of the values.
+bool valid(const LatticeSteps& steps) noexcept;
+
+/// Coefficients of the orthonormal basis grow with √samples; these fractions of step · √samples (and
+/// normal_step · √samples) are their quantiser steps. Means (k = 0) use the whole step.
+inline constexpr double position_gain = 0.75, normal_gain = 0.75;
+
+/// Only between coder and lattice: tangential steps equal the step (the normal turns far over the life).
+inline constexpr uint8_t track_fine = 8;
+inline constexpr int32_t max_symbol = 1 << 20;  ///< no stored integer is larger
+inline constexpr int32_t max_mean = 1 << 30;    ///< likewise mean positions, in step/16
+
+/// The integers of one track. Points: position [term][t1, t2, n] in frame_of(axis), term 0 relative to the
+/// lattice point; second [term][t1, t2, n], term 0 unused (the mean normal is the axis). Drops: position
+/// [term][xyz] likewise, second [term][6].
+struct RawTrack {
+    uint8_t birth, death, flags;  ///< flags: TrackFlags | track_fine
+    uint8_t position_terms, second_terms;
+    int32_t lattice[3];  ///< tangential steps from the origin
+    int32_t axis[2];     ///< octahedral, |u|, |v| ≤ axis_levels
+    int32_t position[max_terms][3];
+    int32_t second[max_terms][6];
+};
+
+/// Levels of one octahedral half axis: neighbouring axes are about normal_step apart.
+int32_t axis_levels(const LatticeSteps& steps) noexcept;
+
+/// Rows t1, t2, n; unit vectors in 1/16384.
+struct Frame {
+    int32_t row[3][3];
+};
+Frame frame_of(const int32_t axis[2], int32_t levels) noexcept;
+inline constexpr Frame identity_frame = {{{16384, 0, 0}, {0, 16384, 0}, {0, 0, 16384}}};
+/// Integer part; 0 for negatives; exact below 2^62.
+int64_t square_root(int64_t x) noexcept;
+/// Nearest octahedral integers to a direction (any length, not zero).
+void nearest_axis(const double direction[3], int32_t levels, int32_t axis[2]) noexcept;
+/// The same in integers only (prediction).
+void nearest_axis(const int64_t direction[3], int32_t levels, int32_t axis[2]) noexcept;
+
+/// While a block is being coded its coefficients hold integers: asset axes, in 1/256 of the step of normal
+/// coefficients; position term 0 in step/16; second term 0 of points = axis.
+inline int32_t load(const float* at) {
+    int32_t value;
+    std::memcpy(&value, at, sizeof value);
+    return value;
+}
+inline void store(float* at, int32_t value) { std::memcpy(at, &value, sizeof value); }
+
+/// Writes track `index` of the block as such integers from track.first_coefficient on (room: see
+/// coefficients_of()). False: a value is too large.
+bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, TrackBlock& block, uint32_t index,
+                 uint32_t first_coefficient) noexcept;
+inline uint32_t coefficients_of(const RawTrack& raw, bool drop) {
+    return raw.position_terms * 3u + raw.second_terms * (drop ? 6u : 3u);
+}
+/// Integers → floats, for all tracks of the block.
+void finish_block(const LatticeSteps& steps, TrackBlock& block) noexcept;
+
+}  // namespace rill::format

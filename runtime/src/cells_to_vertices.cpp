@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// Surface cells → vertices: one per patch, started at the mean of its edge crossings and moved onto the
+// field by Newton steps inside its own cell. (A QEF of Hermite data would also find sharp edges; liquid
+// has few, and the blended field rounds them off anyway.)
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "mesher.h"
+
+namespace rill {
+namespace {
+
+constexpr float cell_margin = 1 / 128.f;  // vertices keep off their cell's faces: no two coincide
+
+uint32_t corner_signs(const Tile& tile, uint32_t cell) {
+    const uint32_t x = cell % 8, row = cell / 8 % 8 + 9 * (cell / 64);
+    const auto pair = [&](uint32_t r) { return uint32_t(tile.inside[r]) >> x & 3; };
+    return pair(row) | pair(row + 1) << 2 | pair(row + 9) << 4 | pair(row + 10) << 6;
+}
+
+/// Row of cell_patches for a surface cell: the doubled face is turned when it is doubled from both sides.
+uint32_t patches_of(const Mesher& m, const Tile& tile, uint32_t cell) {
+    const uint32_t signs = corner_signs(tile, cell), face = cell_patches[signs].doubled_face;
+    if (face == CellPatches::no_face) return signs;
+    int32_t at[3] = {int32_t(cell % 8), int32_t(cell / 8 % 8), int32_t(cell / 64)}, coord[3];
+    std::memcpy(coord, tile.coord, sizeof(coord));
+    at[face / 2] += face & 1 ? 1 : -1;
+    const Tile* beyond = &tile;
+    if (at[face / 2] < 0 || at[face / 2] >= tile_cells) {
+        coord[face / 2] += face & 1 ? 1 : -1;
+        at[face / 2] &= tile_cells - 1;
+        const uint32_t index = find_tile(m, coord);
+        if (index == no_tile) return signs;
+        beyond = &m.tiles[index];
+    }
+    if (!(beyond->surface[at[1] + 8 * at[2]] >> at[0] & 1)) return signs;
+    const uint32_t other = corner_signs(*beyond, uint32_t(at[0] + 8 * (at[1] + 8 * at[2])));
+    return cell_patches[other].doubled_face == (face ^ 1u) ? signs + 256 : signs;
+}
+
+template <typename Work>
+void for_surface_cells(const Tile& tile, Work work) {
+    for (uint32_t row = 0; row < rows_per_tile; ++row)
+        for (uint32_t x = 0, bits = tile.surface[row]; bits; ++x, bits >>= 1)
+            if (bits & 1) work(x + 8 * row);
+}
+
+/// Appends the patches of a cell to the batch: mean of their crossings, and a normal from the signs.
+void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t cell,
+                   const CellPatches& patches, uint32_t& n) {
+    const uint32_t x = cell % 8, y = cell / 8 % 8, z = cell / 64;
+    float sum[4][3] = {}, guess[4][3] = {};
+    uint32_t crossings[4] = {};
+    float value[8];
+    for (uint32_t c = 0; c < 8; ++c)
+        value[c] = tile.value[x + (c & 1) + 9 * (y + (c >> 1 & 1) + 9 * (z + (c >> 2)))];
+    for (uint32_t e = 0; e < 12; ++e) {
+        const uint32_t axis = e / 4, low = patches_detail::edge_corner(e), high = low | 1u << axis;
+        if ((value[low] < 0) == (value[high] < 0)) continue;
+        const uint32_t p = patches.patch[e];
+        for (uint32_t a = 0; a < 3; ++a) sum[p][a] += float(low >> a & 1);
+        sum[p][axis] += value[low] / (value[low] - value[high]);
+        guess[p][axis] += value[low] < 0 ? 1.f : -1.f;
+        ++crossings[p];
+    }
+    const uint32_t at[3] = {x, y, z};
+    for (uint32_t p = 0; p < patches.count; ++p, ++n) {
+        float* out[3] = {s.x + n, s.y + n, s.z + n};
+        for (uint32_t a = 0; a < 3; ++a) {
+            const float inside = std::clamp(sum[p][a] / float(crossings[p]), cell_margin, 1 - cell_margin);
+            *out[a] = (float(tile_cells * tile.coord[a] + int32_t(at[a])) + inside) * m.input.cell_size;
+            s.guess[3 * n + a] = guess[p][a];
+        }
+        s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell);
+    }
+}
+
+/// One step onto the field, inside the cell. `i`: place in the batch.
+void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
+    const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = m.input.cell_size;
+    const float k = s.value[i] / g2;
+    if (!(k * k * g2 < size * size)) return;  // farther than a cell, or no field: stay
+    const uint32_t cell = s.cell[s.slot[i]], at[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    const float g[3] = {s.gx[i], s.gy[i], s.gz[i]};
+    float* p[3] = {s.x + i, s.y + i, s.z + i};
+    for (uint32_t a = 0; a < 3; ++a) {
+        const float corner = float(tile_cells * tile.coord[a] + int32_t(at[a]));
+        *p[a] =
+            std::clamp(*p[a] - k * g[a], (corner + cell_margin) * size, (corner + 1 - cell_margin) * size);
+    }
+}
+
+void write3(const Stream& stream, uint32_t index, const float v[3]) {
+    if (stream.data)
+        std::memcpy(static_cast<uint8_t*>(stream.data) + size_t(index) * stream.stride, v, 3 * sizeof(float));
+}
+
+/// Moves a batch of n vertices onto the field and writes them from `first_vertex` on.
+void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, uint32_t first_vertex) {
+    const bool moving = m.input.velocity && m.input.target && m.input.target->velocity.data;
+    float* velocity = moving ? s.velocity : nullptr;
+    for_batches(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
+        m.access.evaluate_gradient(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
+                                   batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
+                                   velocity);
+        for (uint32_t i = first; i < first + batch; ++i) {
+            step(m, s, tile, i);
+            const uint32_t slot = s.slot[i], vertex = first_vertex + slot;
+            const float p[3] = {s.x[i], s.y[i], s.z[i]};
+            float normal[3] = {s.gx[i], s.gy[i], s.gz[i]};
+            float length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+            if (!(length2 > 1e-12f && length2 < 1e12f) || !(std::abs(s.value[i]) < surface::unsupported)) {
+                std::memcpy(normal, s.guess + 3 * slot, sizeof(normal));
+                if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) normal[2] = 1;
+                length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+            }
+            const float scale = 1 / std::sqrt(length2);
+            for (float& c : normal) c *= scale;
+            std::memcpy(m.position + 3 * size_t(vertex), p, sizeof(p));
+            if (!m.input.target) continue;
+            write3(m.input.target->position, vertex, p);
+            write3(m.input.target->normal, vertex, normal);
+            if (!moving) continue;
+            const float* v = velocity + (i - first);
+            const float speed[3] = {v[0], v[batch], v[2 * batch]};
+            write3(m.input.target->velocity, vertex, speed);
+        }
+    });
+}
+
+void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
+    uint32_t n = 0, done = 0;
+    for_surface_cells(tile, [&](uint32_t cell) {
+        const uint32_t row = patches_of(m, tile, cell);
+        s.patches[cell] = uint16_t(row), s.vertex[cell] = uint16_t(done + n);
+        if (n + 4 > MesherScratch::capacity) {
+            finish_batch(m, s, tile, n, tile.first_vertex + done);
+            done += n, n = 0;
+        }
+        place_patches(m, s, tile, cell, cell_patches[row], n);
+    });
+    finish_batch(m, s, tile, n, tile.first_vertex + done);
+    // The corner values are used up; what the quads need takes their place.
+    for_surface_cells(tile, [&](uint32_t cell) {
+        tile.placed.vertex[cell] = s.vertex[cell], tile.placed.patches[cell] = s.patches[cell];
+    });
+}
+
+}  // namespace
+
+uint32_t prepare_counts(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    sort_tiles(m);
+    return tasks_of(m.order_count, tiles_per_quick_task);
+}
+
+void run_counts(void* mesher, uint32_t task, uint32_t) {
+    const Mesher& m = *static_cast<Mesher*>(mesher);
+    for_tiles(task, tiles_per_quick_task, m.order_count, [&](uint32_t i) {
+        Tile& tile = m.tiles[m.order[i].tile];
+        tile.vertex_count = 0;
+        for_surface_cells(
+            tile, [&](uint32_t cell) { tile.vertex_count += cell_patches[patches_of(m, tile, cell)].count; });
+        tile.index_count = count_indices(m, tile);
+    });
+}
+
+uint32_t prepare_vertices(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    lay_out(m);
+    return tasks_of(m.kept, tiles_per_march_task);
+}
+
+void run_vertices(void* mesher, uint32_t task, uint32_t worker) {
+    const Mesher& m = *static_cast<Mesher*>(mesher);
+    for_tiles(task, tiles_per_march_task, m.kept,
+              [&](uint32_t i) { place_tile(m, m.scratch[worker], m.tiles[m.order[i].tile]); });
+}
+
+}  // namespace rill

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+// Resident chunks at a moment → points and drops. Two rounds of tasks: the first counts who is alive, so
+// that the second may write to fixed places. The order of points is that of the pieces, whoever runs them.
+#include <algorithm>
+
+#include "pipeline.h"
+
+namespace rill {
+namespace {
+
+void add_pieces(Evaluation& e, uint32_t chunk, uint32_t first, uint32_t last) {
+    for (; first < last; first += std::min(piece_tracks, last - first))
+        e.pieces[e.piece_count++] = {chunk, first, first + std::min(piece_tracks, last - first), 0, 0, 0};
+}
+
+const format::TrackBlock& block_of(const Player& player, const Piece& piece) {
+    return *player.residency.chunks[piece.chunk].block;
+}
+
+uint32_t prepare_count(void* context) {
+    auto& player = *static_cast<Player*>(context);
+    Evaluation& e = player.evaluation;
+    const Plan& plan = player.plan;
+    const Moment& moment = plan.moment;
+    const uint32_t samples = player.directory->tables.windows[moment.window].sample_count;
+    e.rows = place_time_rows(e.rows_memory, player.directory->basis, samples, moment.sample,
+                             moment.samples_per_second);
+    e.piece_count = 0;
+    for (uint32_t i = 0; i < plan.now_count; ++i) {
+        const uint32_t chunk = plan.wants[i].chunk;
+        if (player.residency.chunks[chunk].state != ChunkState::resident) continue;
+        const format::TrackBlock& block = *player.residency.chunks[chunk].block;
+        add_pieces(e, chunk, 0, block.point_count);
+        add_pieces(e, chunk, block.point_count, block.point_count + block.drop_count);
+    }
+    return e.piece_count;
+}
+
+void run_count(void* context, uint32_t index, uint32_t) {
+    auto& player = *static_cast<Player*>(context);
+    Evaluation& e = player.evaluation;
+    Piece& piece = e.pieces[index];
+    format::PointSet no_points{};
+    format::DropSet no_drops{};
+    piece.active = evaluate_tracks(e.rows, block_of(player, piece), piece.first, piece.last, 0, 0, no_points,
+                                   no_drops);
+}
+
+/// Coarse layers get their places first; what no longer fits is left out and reported.
+uint32_t prepare_evaluate(void* context) {
+    auto& player = *static_cast<Player*>(context);
+    Evaluation& e = player.evaluation;
+    uint32_t left = player.limits.points;
+    if (player.frame.budget.points) left = std::min(left, player.frame.budget.points);
+    e.points.count = e.drops.count = e.points_wanted = 0;
+    e.cut = false;
+    for (uint32_t i = 0; i < e.piece_count; ++i) {
+        Piece& piece = e.pieces[i];
+        const bool drops = piece.first >= block_of(player, piece).point_count;
+        uint32_t& count = drops ? e.drops.count : e.points.count;
+        const uint32_t capacity = drops ? e.drop_capacity : e.point_capacity;
+        piece.offset = count;
+        piece.room = std::min({piece.active, left, capacity - count});
+        e.cut = e.cut || piece.room < piece.active;
+        e.points_wanted += piece.active;
+        count += piece.room;
+        left -= piece.room;
+    }
+    return e.piece_count;
+}
+
+format::PointSet slice(const format::PointSet& all, uint32_t offset) {
+    return {0,          all.x + offset,  all.y + offset,  all.z + offset,  all.nx + offset, all.ny + offset,
+            all.nz + offset, all.vx + offset, all.vy + offset, all.vz + offset, all.activity + offset};
+}
+
+format::DropSet slice(const format::DropSet& all, uint32_t offset) {
+    format::DropSet part{0, all.x + offset, all.y + offset, all.z + offset, {}, all.vx + offset,
+                         all.vy + offset, all.vz + offset, all.activity + offset};
+    for (int i = 0; i < 6; ++i) part.shape[i] = all.shape[i] + offset;
+    return part;
+}
+
+void write_vector(const Stream& stream, uint32_t index, float x, float y, float z) {
+    if (!stream.data) return;
+    auto* out = reinterpret_cast<float*>(static_cast<uint8_t*>(stream.data) + uint64_t(index) * stream.stride);
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+}
+
+/// The points themselves, for those who want to see them.
+void hand_out_points(const format::PointSet& points, uint32_t first, uint32_t last, const Target& target) {
+    last = std::min(last, target.point_capacity);
+    for (uint32_t i = first; i < last; ++i) {
+        write_vector(target.point_position, i, points.x[i], points.y[i], points.z[i]);
+        write_vector(target.point_normal, i, points.nx[i], points.ny[i], points.nz[i]);
+    }
+}
+
+void run_evaluate(void* context, uint32_t index, uint32_t) {
+    auto& player = *static_cast<Player*>(context);
+    Evaluation& e = player.evaluation;
+    const Piece& piece = e.pieces[index];
+    if (!piece.room) return;
+    const format::TrackBlock& block = block_of(player, piece);
+    format::PointSet points{};
+    format::DropSet drops{};
+    if (piece.first >= block.point_count) {
+        drops = slice(e.drops, piece.offset);
+        evaluate_tracks(e.rows, block, piece.first, piece.last, 0, piece.room, points, drops);
+    } else {
+        points = slice(e.points, piece.offset);
+        evaluate_tracks(e.rows, block, piece.first, piece.last, piece.room, 0, points, drops);
+        hand_out_points(e.points, piece.offset, piece.offset + piece.room, *player.frame.target);
+    }
+}
+
+}  // namespace
+
+const Stage evaluate_stages[evaluate_stage_count] = {
+    {prepare_count, run_count, false},
+    {prepare_evaluate, run_evaluate, false},
+};
+
+}  // namespace rill

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#include "src/coefficients_to_points.h"
+
+#include <cmath>
+#include <new>
+
+#include "format/layout.h"
+
+namespace rill {
+
+/// Behind it: for every life [birth, death] that is active at s, and both bases, one row of values and one
+/// of derivatives.
+struct TimeRows {
+    uint32_t samples, stride;  ///< stride: floats in a row
+    double s;
+    float samples_per_second;
+};
+
+namespace {
+
+constexpr uint32_t alignment = 64;
+
+uint32_t row_stride(uint32_t samples) {
+    const uint32_t terms = samples < format::max_terms ? samples : format::max_terms;
+    return (terms + 3) / 4 * 4;
+}
+size_t header_bytes() { return (sizeof(TimeRows) + alignment - 1) / alignment * alignment; }
+
+float* rows_of(const TimeRows* rows, uint32_t birth, uint32_t death, bool cosine) {
+    const uint32_t life = birth * rows->samples - birth * (birth - 1) / 2 + (death - birth);  // of a triangle
+    auto* floats = reinterpret_cast<float*>(reinterpret_cast<uintptr_t>(rows) + header_bytes());
+    return floats + size_t(life * 2 + cosine) * 2 * rows->stride;
+}
+
+/// 0: absent.
+float activity_at(const format::Track& track, double s) {
+    if (s < track.birth) return track.flags & format::track_born ? float(s - track.birth + 1) : 0.f;
+    if (s > track.death) return track.flags & format::track_dies ? float(track.death + 1 - s) : 0.f;
+    return 1.f;
+}
+
+/// Σ row[k] · coefficient[k][c]: the channels of a track at one moment.
+template <uint32_t channels>
+void combine(const float* coefficients, const float* row, uint32_t terms, float* out) {
+    float sum[channels] = {};
+    for (uint32_t k = 0; k < terms; ++k, coefficients += channels)
+        for (uint32_t c = 0; c < channels; ++c) sum[c] += row[k] * coefficients[c];
+    for (uint32_t c = 0; c < channels; ++c) out[c] = sum[c];
+}
+
+}  // namespace
+
+size_t time_rows_bytes(uint32_t sample_count) noexcept {
+    const size_t lives = size_t(sample_count) * (sample_count + 1) / 2;
+    return header_bytes() + lives * 4 * row_stride(sample_count) * sizeof(float);
+}
+
+TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count, double s,
+                          double samples_per_second) noexcept {
+    auto* rows = new (memory) TimeRows{sample_count, row_stride(sample_count), s, float(samples_per_second)};
+    for (uint32_t birth = 0; birth < sample_count && birth < s + 1; ++birth)
+        for (uint32_t death = birth; death < sample_count; ++death) {
+            if (death + 1 <= s) continue;
+            const uint32_t life = death - birth + 1;
+            for (int cosine = 0; cosine < 2; ++cosine) {
+                float* row = rows_of(rows, birth, death, cosine);
+                format::basis_row(tables, life, cosine, s - birth, format::most_terms(life, cosine), row,
+                                  row + rows->stride);
+            }
+        }
+    return rows;
+}
+
+uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last,
+                         uint32_t point_capacity, uint32_t drop_capacity, format::PointSet& points,
+                         format::DropSet& drops) noexcept {
+    uint32_t active = 0;
+    for (uint32_t i = first; i < last; ++i) {
+        const format::Track& track = block.tracks[i];
+        const float activity = activity_at(track, rows->s);
+        if (!(activity > 0)) continue;
+        const float* row = rows_of(rows, track.birth, track.death, (track.flags & format::track_cosine) != 0);
+        const float* coefficients = block.coefficients + track.first_coefficient;
+        const float* second = coefficients + 3 * track.position_terms;
+        float x[3], v[3];
+        combine<3>(coefficients, row, track.position_terms, x);
+        combine<3>(coefficients, row + rows->stride, track.position_terms, v);
+        for (int c = 0; c < 3; ++c) x[c] += block.origin[c], v[c] *= rows->samples_per_second;
+        bool sound = true;
+        for (int c = 0; c < 3; ++c) sound = sound && std::isfinite(x[c]) && std::isfinite(v[c]);
+        if (i < block.point_count) {
+            float n[3];
+            combine<3>(second, row, track.second_terms, n);
+            const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+            if (!sound || !(length > 1e-20f) || !std::isfinite(length)) continue;
+            ++active;
+            if (points.count >= point_capacity) continue;
+            const uint32_t at = points.count++;
+            points.x[at] = x[0], points.y[at] = x[1], points.z[at] = x[2];
+            points.nx[at] = n[0] / length, points.ny[at] = n[1] / length, points.nz[at] = n[2] / length;
+            points.vx[at] = v[0], points.vy[at] = v[1], points.vz[at] = v[2];
+            points.activity[at] = activity;
+        } else {
+            float shape[6];
+            combine<6>(second, row, track.second_terms, shape);
+            for (const float value : shape) sound = sound && std::isfinite(value);
+            if (!sound) continue;
+            ++active;
+            if (drops.count >= drop_capacity) continue;
+            const uint32_t at = drops.count++;
+            drops.x[at] = x[0], drops.y[at] = x[1], drops.z[at] = x[2];
+            for (int c = 0; c < 6; ++c) drops.shape[c][at] = shape[c];
+            drops.vx[at] = v[0], drops.vy[at] = v[1], drops.vz[at] = v[2];
+            drops.activity[at] = activity;
+        }
+    }
+    return active;
+}
+
+}  // namespace rill

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// The mesher's memory and its table of stages. march.cpp finds the surface cells, cells_to_vertices.cpp
+// places their vertices, mesh_to_buffers.cpp joins them to triangles in the caller's buffers.
+#include "field_to_mesh.h"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+
+#include "mesher.h"
+
+namespace rill {
+namespace {
+
+MeshLimits completed(MeshLimits limits) {
+    limits.workers = std::max(limits.workers, 1u);
+    // Smooth or violent, a surface has about 60 cells in each tile it crosses (measured); droplets fewer.
+    if (limits.tiles == 0) limits.tiles = limits.vertices / 32 + 64;
+    return limits;
+}
+
+uint32_t hash_slots(uint32_t tiles) {
+    uint32_t slots = 64;
+    while (slots < tiles * uint64_t(2) && slots < 1u << 31) slots *= 2;
+    return slots;
+}
+
+/// Hands out pieces of one block, 64-byte aligned each; with a null base it only measures.
+struct Carver {
+    uint8_t* base;
+    size_t used = 0;
+    template <typename T>
+    T* take(size_t count) {
+        T* piece = base ? reinterpret_cast<T*>(base + used) : nullptr;
+        used += (count * sizeof(T) + 63) & ~size_t(63);
+        return piece;
+    }
+};
+
+size_t carve(void* memory, const MeshLimits& limits, Mesher& m) {
+    Carver carver{static_cast<uint8_t*>(memory)};
+    carver.take<Mesher>(1);
+    m.tiles = carver.take<Tile>(limits.tiles);
+    m.hash = carver.take<uint32_t>(hash_slots(limits.tiles));
+    m.active = carver.take<uint32_t>(limits.tiles);
+    m.next_active = carver.take<uint32_t>(limits.tiles);
+    m.order = carver.take<OrderedTile>(limits.tiles);
+    m.position = carver.take<float>(3 * size_t(limits.vertices));
+    m.scratch = carver.take<MesherScratch>(limits.workers);
+    return carver.used;
+}
+
+}  // namespace
+
+size_t mesher_bytes(const MeshLimits& limits) noexcept {
+    Mesher unused;
+    return carve(nullptr, completed(limits), unused);
+}
+
+Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept {
+    Mesher* m = new (memory) Mesher{};
+    m->limits = completed(limits);
+    carve(memory, m->limits, *m);
+    m->hash_mask = hash_slots(m->limits.tiles) - 1;
+    m->access = {surface::gather, surface::evaluate, surface::evaluate_gradient};
+    return m;
+}
+
+void begin_mesh(Mesher* m, const MeshInput& input) noexcept {
+    m->input = input;
+    m->inverse_tile = 1 / (tile_cells * input.cell_size);
+    m->cut = m->vertices_wanted = m->indices_wanted = m->ranges_wanted = 0;
+    m->tile_count = m->order_count = m->kept = 0;
+    m->active_count = m->next_active_count = m->colour = 0;
+    m->tiles_ran_out = false, m->seeding = true;
+    std::memset(m->hash, 0, (size_t(m->hash_mask) + 1) * sizeof(uint32_t));
+    for (uint32_t w = 0; w < m->limits.workers; ++w) m->scratch[w].corners_evaluated = 0;
+}
+
+const Stage* mesh_stages(uint32_t* count) noexcept {
+    static constexpr Stage stages[] = {
+        {prepare_march, run_march, true},        {prepare_counts, run_counts, false},
+        {prepare_vertices, run_vertices, false}, {prepare_quads, run_quads, false},
+        {prepare_ranges, nullptr, false},
+    };
+    *count = uint32_t(sizeof(stages) / sizeof(stages[0]));
+    return stages;
+}
+
+MeshCounts mesh_counts(const Mesher* m) noexcept {
+    uint64_t corners = 0;
+    for (uint32_t w = 0; w < m->limits.workers; ++w) corners += m->scratch[w].corners_evaluated;
+    return {m->cut, m->vertices_wanted, m->indices_wanted, m->ranges_wanted,
+            uint32_t(std::min<uint64_t>(corners, ~0u))};
+}
+
+}  // namespace rill

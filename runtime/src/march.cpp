@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: MIT
+// Which cells the surface crosses: marched from the points (Keeler & Bridson, section 1). Cells crossed by
+// the points' own discs are visited first; every face with corners of both signs then leads to the cell
+// beyond it, until no such face is left. So the surface is closed wherever room and views let it be.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "mesher.h"
+
+namespace rill {
+namespace {
+
+constexpr float disc_share = 0.4f;  // of a patch's support: discs of neighbours just overlap
+constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
+
+int32_t tile_at(const Mesher& m, float x) {
+    const float t = std::floor(x * m.inverse_tile);
+    return t > -2e6f && t < 2e6f ? int32_t(t) : farthest_tile;
+}
+
+void want(Tile& tile, const int cell[3]) { tile.pending[cell[1] + 8 * cell[2]] |= uint8_t(1 << cell[0]); }
+
+/// Tiles that the disc of point i may cross.
+void seed_point(Mesher& m, uint32_t i) {
+    const surface::Field& f = *m.input.field;
+    const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
+    const float radius = disc_share * f.support[i], size = tile_cells * m.input.cell_size;
+    int32_t from[3], to[3], home[3];
+    for (int a = 0; a < 3; ++a) {
+        home[a] = tile_at(m, p[a]);
+        if (home[a] == farthest_tile) return;
+        const float extent = radius * std::sqrt(std::max(0.f, 1 - n[a] * n[a]));
+        from[a] = std::max(tile_at(m, p[a] - extent), home[a] - most_seed_tiles);
+        to[a] = std::min(tile_at(m, p[a] + extent), home[a] + most_seed_tiles);
+    }
+    const float reach = 0.5f * size * (std::abs(n[0]) + std::abs(n[1]) + std::abs(n[2]));
+    int32_t c[3];
+    for (c[2] = from[2]; c[2] <= to[2]; ++c[2])
+        for (c[1] = from[1]; c[1] <= to[1]; ++c[1])
+            for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) {
+                float height = 0;
+                for (int a = 0; a < 3; ++a) height += n[a] * ((float(c[a]) + 0.5f) * size - p[a]);
+                const bool is_home = c[0] == home[0] && c[1] == home[1] && c[2] == home[2];
+                if (std::abs(height) > reach && !is_home) continue;
+                const uint32_t tile = find_or_create_tile(m, c);
+                if (tile != no_tile) queue_tile(m, tile);
+            }
+}
+
+/// The cells where the six half axes leave the ellipsoid; it is convex, so the march finds the rest.
+void seed_drop(Mesher& m, uint32_t i) {
+    const surface::Field& f = *m.input.field;
+    constexpr int row[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
+    for (int a = 0; a < 6; ++a) {
+        float p[3] = {f.dx[i], f.dy[i], f.dz[i]}, length2 = 0;
+        for (int k : row[a / 2]) length2 += f.inverse[k][i] * f.inverse[k][i];
+        if (!(length2 > 0)) continue;
+        p[a / 2] += (a & 1 ? 1.f : -1.f) / std::sqrt(length2);
+        int32_t tile_coord[3];
+        int cell[3];
+        for (int b = 0; b < 3; ++b) {
+            tile_coord[b] = tile_at(m, p[b]);
+            cell[b] = int32_t(std::floor(p[b] / m.input.cell_size)) - tile_cells * tile_coord[b];
+            cell[b] = std::clamp(cell[b], 0, tile_cells - 1);
+        }
+        const uint32_t tile = find_or_create_tile(m, tile_coord);
+        if (tile == no_tile) continue;
+        want(m.tiles[tile], cell);
+        queue_tile(m, tile);
+    }
+}
+
+/// Marks the cells of the tile that the disc of point i crosses, column by column along the axis its normal
+/// is nearest to. A guess is enough: the march finds what is missed.
+void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
+    const surface::Field& f = *m.input.field;
+    const float cells = 1 / m.input.cell_size, radius = disc_share * f.support[i] * cells + 0.5f;
+    const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
+    float at[3];  // in cells of this tile
+    int from[3], to[3], home[3];
+    bool is_home = true;
+    for (int a = 0; a < 3; ++a) {
+        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
+        from[a] = int(std::clamp(std::floor(at[a] - radius), 0.f, 8.f));
+        to[a] = int(std::clamp(std::floor(at[a] + radius), -1.f, 7.f));
+        if (from[a] > to[a]) return;
+        is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
+        home[a] = int(std::clamp(at[a], 0.f, 7.f));
+    }
+    if (is_home) want(tile, home);
+    const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
+                                                     : (std::abs(n[1]) > std::abs(n[2]) ? 1 : 2);
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const float slope_u = -n[u] / n[axis], slope_v = -n[v] / n[axis], bend = -m.input.cell_size / n[axis];
+    const float half = 0.5f * (std::abs(slope_u) + std::abs(slope_v));
+    float r[3];
+    int cell[3];
+    for (cell[v] = from[v]; cell[v] <= to[v]; ++cell[v])
+        for (cell[u] = from[u]; cell[u] <= to[u]; ++cell[u]) {
+            r[u] = float(cell[u]) + 0.5f - at[u], r[v] = float(cell[v]) + 0.5f - at[v];
+            r[axis] = slope_u * r[u] + slope_v * r[v];  // in the plane; then by the quadratic above it
+            if (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > radius * radius) continue;
+            const float above =
+                f.qxx[i] * r[0] * r[0] + f.qyy[i] * r[1] * r[1] + f.qzz[i] * r[2] * r[2] +
+                2 * (f.qxy[i] * r[0] * r[1] + f.qxz[i] * r[0] * r[2] + f.qyz[i] * r[1] * r[2]);
+            const float middle = at[axis] + r[axis] + bend * above;
+            const int last = int(std::clamp(std::floor(middle + half), -1.f, 7.f));
+            cell[axis] = int(std::clamp(std::floor(middle - half), 0.f, 8.f));
+            for (; cell[axis] <= last; ++cell[axis]) want(tile, cell);
+        }
+}
+
+void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
+    surface::Box box;
+    const float size = tile_cells * m.input.cell_size;
+    for (int a = 0; a < 3; ++a)
+        box.lower[a] = float(tile.coord[a]) * size, box.upper[a] = float(tile.coord[a] + 1) * size;
+    const uint32_t count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
+    for (uint32_t c = 0; c < std::min(count, s.most_candidates); ++c)
+        if (s.candidates[c] < m.input.field->point_count) draw_disc(m, tile, s.candidates[c]);
+}
+
+float corner_at(const Mesher& m, const Tile& tile, uint32_t axis, uint32_t corner) {
+    return float(tile_cells * tile.coord[axis] + int32_t(corner)) * m.input.cell_size;
+}
+
+/// Evaluates the corners of the pending cells that are not known yet.
+void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
+    uint16_t need[81] = {};
+    for (uint32_t z = 0; z < 8; ++z)
+        for (uint32_t y = 0; y < 8; ++y) {
+            const uint32_t p = tile.pending[y + 8 * z], row = y + 9 * z;
+            const uint16_t corners = uint16_t(p | p << 1);
+            need[row] |= corners, need[row + 1] |= corners, need[row + 9] |= corners,
+                need[row + 10] |= corners;
+        }
+    uint32_t n = 0;
+    // Octant by octant, so that batches are compact.
+    for (uint32_t octant = 0; octant < 8; ++octant) {
+        const uint32_t from_y = octant & 2 ? 5 : 0, to_y = octant & 2 ? 9 : 5;
+        const uint32_t from_z = octant & 4 ? 5 : 0, to_z = octant & 4 ? 9 : 5;
+        for (uint32_t z = from_z; z < to_z; ++z)
+            for (uint32_t y = from_y; y < to_y; ++y) {
+                const uint32_t row = y + 9 * z;
+                uint32_t bits = need[row] & ~uint32_t(tile.known[row]) & (octant & 1 ? 0x1e0 : 0x01f);
+                tile.known[row] |= uint16_t(bits);
+                for (uint32_t x = 0; bits; ++x, bits >>= 1) {
+                    if (!(bits & 1)) continue;
+                    s.x[n] = corner_at(m, tile, 0, x), s.y[n] = corner_at(m, tile, 1, y);
+                    s.z[n] = corner_at(m, tile, 2, z), s.slot[n++] = uint16_t(x + 9 * row);
+                }
+            }
+    }
+    s.corners_evaluated += n;
+    for_batches(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
+        m.access.evaluate(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
+                          s.value + first);
+    });
+    for (uint32_t i = 0; i < n; ++i) {
+        // Where nothing is known there is air; this also catches what is not a number.
+        const float value = std::abs(s.value[i]) < surface::unsupported ? s.value[i] : m.input.cell_size;
+        tile.value[s.slot[i]] = value;
+        tile.inside[s.slot[i] / 9] |= uint16_t(uint32_t(value < 0) << (s.slot[i] % 9));
+    }
+}
+
+/// Takes over the corners that neighbours have evaluated already. Rounds alternate between the two colours
+/// of a chequerboard, so none of these neighbours is running.
+void borrow_corners(const Mesher& m, Tile& tile) {
+    for (uint32_t face = 0; face < 6; ++face) {
+        int32_t coord[3] = {tile.coord[0], tile.coord[1], tile.coord[2]};
+        coord[face / 2] += face & 1 ? 1 : -1;
+        const uint32_t index = find_tile(m, coord);
+        if (index == no_tile) continue;
+        const Tile& from = m.tiles[index];
+        constexpr uint32_t step[3] = {1, 9, 81};
+        const uint32_t stride = step[face / 2], u = step[(face / 2 + 1) % 3], v = step[(face / 2 + 2) % 3];
+        const uint32_t ours = face & 1 ? 8 * stride : 0, theirs = face & 1 ? 0 : 8 * stride;
+        for (uint32_t k = 0; k < 81; ++k) {
+            const uint32_t at = k % 9 * u + k / 9 * v, to = ours + at, source = theirs + at;
+            if (!(from.known[source / 9] >> source % 9 & 1)) continue;
+            tile.value[to] = from.value[source];
+            tile.known[to / 9] |= uint16_t(1 << to % 9);
+            tile.inside[to / 9] |= uint16_t((from.inside[source / 9] >> source % 9 & 1) << to % 9);
+        }
+    }
+}
+
+/// Faces spanned by corners x and x + 1 of the rows: both signs present.
+uint32_t mixed(uint32_t any, uint32_t all) { return (any | any >> 1) & ~(all & all >> 1) & 0xff; }
+
+/// Visits the pending cells, and makes pending what lies beyond their sign-changing faces.
+void visit(Tile& tile) {
+    uint8_t next[rows_per_tile] = {};
+    for (uint32_t row = 0; row < rows_per_tile; ++row) {
+        const uint32_t pending = tile.pending[row];
+        if (!pending) continue;
+        const uint32_t y = row % 8, z = row / 8;
+        const uint16_t* corner = tile.inside + y + 9 * z;
+        const uint32_t a = corner[0], b = corner[1], c = corner[9], d = corner[10];
+        const uint32_t any = a | b | c | d, all = a & b & c & d;
+        const uint32_t active = pending & mixed(any, all), x_faces = any & ~all;
+        tile.visited[row] |= uint8_t(pending), tile.surface[row] |= uint8_t(active);
+        const uint32_t left = active & x_faces, right = active & (x_faces >> 1);
+        next[row] |= uint8_t(left >> 1 | right << 1);
+        tile.cross[0] |= uint64_t(left & 1) << row, tile.cross[1] |= uint64_t(right >> 7) << row;
+        const auto push = [&](uint32_t bits, bool at_border, uint32_t neighbour, uint32_t face,
+                              uint32_t byte) {
+            if (at_border)
+                tile.cross[face] |= uint64_t(bits) << (8 * byte);
+            else
+                next[neighbour] |= uint8_t(bits);
+        };
+        push(active & mixed(a | c, a & c), y == 0, row - 1, 2, z);
+        push(active & mixed(b | d, b & d), y == 7, row + 1, 3, z);
+        push(active & mixed(a | b, a & b), z == 0, row - 8, 4, y);
+        push(active & mixed(c | d, c & d), z == 7, row + 8, 5, y);
+    }
+    for (uint32_t row = 0; row < rows_per_tile; ++row)
+        tile.pending[row] = next[row] & uint8_t(~tile.visited[row]);
+}
+
+bool has_pending(const Tile& tile) {
+    return std::any_of(tile.pending, tile.pending + rows_per_tile, [](uint8_t r) { return r != 0; });
+}
+
+/// Hands the cells wanted beyond each face to the neighbours; makes them where they are missing.
+void exchange(Mesher& m, uint32_t index) {
+    for (uint32_t face = 0; face < 6; ++face) {
+        const uint64_t wanted = m.tiles[index].cross[face];
+        if (!wanted) continue;
+        int32_t coord[3];
+        std::memcpy(coord, m.tiles[index].coord, sizeof(coord));
+        coord[face / 2] += face & 1 ? 1 : -1;
+        const uint32_t neighbour = find_or_create_tile(m, coord);
+        if (neighbour == no_tile) continue;
+        Tile& tile = m.tiles[neighbour];
+        const uint32_t entry = face & 1 ? 0 : 7;  // the neighbour's layer next to us
+        bool more = false;
+        const auto take = [&](uint32_t row, uint32_t bits) {
+            bits &= ~uint32_t(tile.visited[row]);
+            tile.pending[row] |= uint8_t(bits);
+            more = more || bits;
+        };
+        for (uint32_t k = 0; k < 8; ++k) {
+            const uint32_t bits = uint32_t(wanted >> (8 * k)) & 0xff;
+            if (face / 2 == 1) take(entry + 8 * k, bits);
+            if (face / 2 == 2) take(k + 8 * entry, bits);
+            for (uint32_t y = 0; face / 2 == 0 && y < 8; ++y) take(y + 8 * k, (bits >> y & 1) << entry);
+        }
+        if (more) queue_tile(m, neighbour);
+    }
+}
+
+/// The queued tiles of the next colour make up the coming round.
+void take_colour(Mesher& m) {
+    const uint32_t queued = m.next_active_count;
+    m.colour ^= 1;
+    m.active_count = m.next_active_count = 0;
+    for (uint32_t i = 0; i < queued; ++i) {
+        const uint32_t index = m.next_active[i];
+        Tile& tile = m.tiles[index];
+        if (uint32_t(tile.coord[0] ^ tile.coord[1] ^ tile.coord[2]) % 2 == m.colour) {
+            m.active[m.active_count++] = index;
+            tile.queued = false;
+        } else {
+            m.next_active[m.next_active_count++] = index;
+        }
+    }
+}
+
+bool usable(const MeshInput& input) { return input.field && input.cell_size > 0 && input.cell_size < 1e18f; }
+
+}  // namespace
+
+uint32_t prepare_march(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    if (!usable(m.input)) return 0;
+    if (m.seeding) {
+        for (uint32_t i = 0; i < m.input.field->point_count; ++i) seed_point(m, i);
+        for (uint32_t i = 0; i < m.input.field->drop_count; ++i) seed_drop(m, i);
+    } else {
+        for (uint32_t i = 0; i < m.active_count; ++i) exchange(m, m.active[i]);
+    }
+    m.seeding = false;
+    take_colour(m);
+    if (m.active_count == 0 && m.next_active_count) take_colour(m);
+    return tasks_of(m.active_count, tiles_per_march_task);
+}
+
+void run_march(void* mesher, uint32_t task, uint32_t worker) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    MesherScratch& s = m.scratch[worker];
+    for_tiles(task, tiles_per_march_task, m.active_count, [&](uint32_t i) {
+        Tile& tile = m.tiles[m.active[i]];
+        std::memset(tile.cross, 0, sizeof(tile.cross));
+        if (!tile.seeded) draw_discs(m, s, tile);
+        tile.seeded = true;
+        borrow_corners(m, tile);
+        while (has_pending(tile)) {
+            evaluate_corners(m, s, tile);
+            visit(tile);
+        }
+    });
+}
+
+}  // namespace rill

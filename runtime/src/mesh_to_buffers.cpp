@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+// Mesh → the caller's buffers: one quad around every sign-changing lattice edge, cut at whole tiles where
+// capacity ends. An edge belongs to the tile of its lower corner; the other cells around it then lie in
+// tiles earlier in the order, so dropping tiles from its end never leaves a triangle without its vertices.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "mesher.h"
+
+namespace rill {
+namespace {
+
+/// A tile and its lower neighbours: bit a of the index set = one tile down along axis a.
+struct Neighbourhood {
+    const Tile* tile[8];
+};
+Neighbourhood neighbourhood(const Mesher& m, const Tile& tile) {
+    Neighbourhood n;
+    n.tile[0] = &tile;
+    for (int32_t k = 1; k < 8; ++k) {
+        const int32_t coord[3] = {tile.coord[0] - (k & 1), tile.coord[1] - (k >> 1 & 1),
+                                  tile.coord[2] - (k >> 2)};
+        const uint32_t index = find_tile(m, coord);
+        n.tile[k] = index == no_tile ? nullptr : &m.tiles[index];
+    }
+    return n;
+}
+
+/// Surface cells of row (y, z), y and z from −1; `shift`: bit x tells of cell x − 1.
+uint32_t surface_row(const Neighbourhood& n, int y, int z, bool shift) {
+    const uint32_t k = (y < 0 ? 2u : 0u) | (z < 0 ? 4u : 0u), row = uint32_t((y & 7) + 8 * (z & 7));
+    const uint32_t here = n.tile[k] ? n.tile[k]->surface[row] : 0;
+    if (!shift) return here;
+    const uint32_t beyond = n.tile[k | 1] ? n.tile[k | 1]->surface[row] : 0;
+    return (here << 1 & 0xff) | beyond >> 7;
+}
+
+/// Per axis: which lattice edges from the lower corners of the row's cells carry a quad, i.e. change sign
+/// and have all four cells.
+struct QuadMasks {
+    uint32_t axis[3];
+};
+QuadMasks quads_of_row(const Neighbourhood& n, int y, int z) {
+    const uint32_t here = n.tile[0]->surface[y + 8 * z];
+    if (!here) return {};
+    const uint16_t* corner = n.tile[0]->inside + y + 9 * z;
+    const uint32_t back = surface_row(n, y, z, true), down = surface_row(n, y, z - 1, false),
+                   back_down = surface_row(n, y, z - 1, true), left = surface_row(n, y - 1, z, false),
+                   back_left = surface_row(n, y - 1, z, true),
+                   left_down = surface_row(n, y - 1, z - 1, false);
+    return {{(corner[0] ^ uint32_t(corner[0]) >> 1) & here & left & down & left_down,
+             uint32_t(corner[0] ^ corner[1]) & here & back & down & back_down,
+             uint32_t(corner[0] ^ corner[9]) & here & back & left & back_left}};
+}
+
+/// The vertex of the cell at tile-relative x y z (each from −1) on the patch that `edge` belongs to.
+uint32_t vertex_at(const Neighbourhood& n, const int at[3], uint32_t edge) {
+    const uint32_t k = (at[0] < 0 ? 1u : 0u) | (at[1] < 0 ? 2u : 0u) | (at[2] < 0 ? 4u : 0u);
+    const Tile& tile = *n.tile[k];
+    const uint32_t cell = uint32_t((at[0] & 7) + 8 * (at[1] & 7) + 64 * (at[2] & 7));
+    return tile.first_vertex + tile.placed.vertex[cell] + cell_patches[tile.placed.patches[cell]].patch[edge];
+}
+
+struct Vector {
+    float x, y, z;
+};
+Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+float dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vector cross(const Vector& a, const Vector& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Splits along 0–2 or 1–3: the shorter, unless only the other keeps both triangles facing one way.
+bool split_at_first(const Vector p[4]) {
+    const Vector a = p[2] - p[0], b = p[3] - p[1];
+    const float first = dot(cross(p[1] - p[0], a), cross(a, p[3] - p[0]));
+    const float second = dot(cross(p[2] - p[1], b), cross(b, p[0] - p[1]));
+    if ((first > 0) != (second > 0)) return first > 0;
+    return dot(a, a) <= dot(b, b);
+}
+
+struct TileWriter {
+    const Mesher& m;
+    Tile& tile;
+    Neighbourhood near;
+    uint32_t* out;  ///< null: not wanted
+
+    void quad(uint32_t axis, const int at[3], bool liquid_below) {
+        const uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+        uint32_t index[4];
+        Vector p[4];
+        // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below.
+        constexpr int step_u[4] = {-1, 0, 0, -1}, step_v[4] = {-1, -1, 0, 0};
+        for (uint32_t k = 0; k < 4; ++k) {
+            const uint32_t from = liquid_below ? k : 3 - k;
+            int cell[3] = {at[0], at[1], at[2]};
+            cell[u] += step_u[from], cell[v] += step_v[from];
+            index[k] = vertex_at(near, cell, 4 * axis + (step_u[from] ? 1 : 0) + (step_v[from] ? 2 : 0));
+            const float* q = m.position + 3 * size_t(index[k]);
+            p[k] = {q[0], q[1], q[2]};
+            for (uint32_t a = 0; a < 3; ++a) {
+                tile.lower[a] = std::min(tile.lower[a], q[a]);
+                tile.upper[a] = std::max(tile.upper[a], q[a]);
+            }
+        }
+        if (!out) return;
+        const uint32_t s = split_at_first(p) ? 0 : 1;
+        const uint32_t six[6] = {index[s], index[s + 1], index[s + 2],
+                                 index[s], index[s + 2], index[(s + 3) & 3]};
+        std::memcpy(out, six, sizeof(six));
+        out += 6;
+    }
+};
+
+void write_tile(const Mesher& m, Tile& tile) {
+    const Target* target = m.input.target;
+    uint32_t* out = target && target->indices ? target->indices + tile.first_index : nullptr;
+    TileWriter writer{m, tile, neighbourhood(m, tile), out};
+    for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
+    for (int z = 0; z < tile_cells; ++z)
+        for (int y = 0; y < tile_cells; ++y) {
+            const QuadMasks quads = quads_of_row(writer.near, y, z);
+            const uint32_t liquid = tile.inside[y + 9 * z];
+            for (uint32_t axis = 0; axis < 3; ++axis)
+                for (int x = 0; x < tile_cells; ++x) {
+                    const int at[3] = {x, y, z};
+                    if (quads.axis[axis] >> x & 1) writer.quad(axis, at, liquid >> x & 1);
+                }
+        }
+}
+
+bool same_group(const Mesher& m, uint32_t a, uint32_t b) {
+    return m.order[a].key >> OrderedTile::group_shift == m.order[b].key >> OrderedTile::group_shift;
+}
+
+}  // namespace
+
+uint32_t count_indices(const Mesher& m, const Tile& tile) noexcept {
+    const Neighbourhood near = neighbourhood(m, tile);
+    uint32_t quads = 0;
+    for (int z = 0; z < tile_cells; ++z)
+        for (int y = 0; y < tile_cells; ++y)
+            for (uint32_t mask : quads_of_row(near, y, z).axis)
+                for (; mask; mask &= mask - 1) ++quads;
+    return 6 * quads;
+}
+
+void lay_out(Mesher& m) noexcept {
+    const Target* target = m.input.target;
+    const uint64_t most_vertices = std::min(m.limits.vertices, target ? target->vertex_capacity : ~0u);
+    const uint64_t most_indices = target && target->indices ? target->index_capacity : ~0u;
+    const uint64_t most_ranges = target && target->ranges ? target->range_capacity : ~0u;
+    uint64_t vertices = 0, indices = 0, ranges = 0;
+    bool open_range = false, room = true;  // open_range: this group has triangles already
+    m.kept = 0;
+    for (uint32_t i = 0; i < m.order_count; ++i) {
+        Tile& tile = m.tiles[m.order[i].tile];
+        if (i == 0 || !same_group(m, i - 1, i)) open_range = false;
+        if (tile.index_count && !open_range) ++ranges, open_range = true;
+        tile.first_vertex = uint32_t(vertices), tile.first_index = uint32_t(indices);
+        vertices += tile.vertex_count, indices += tile.index_count;
+        room = room && vertices <= most_vertices && indices <= most_indices && ranges <= most_ranges;
+        m.kept += room;
+    }
+    if (vertices > most_vertices) m.cut |= cut_vertices;
+    if (indices > most_indices) m.cut |= cut_indices;
+    if (ranges > most_ranges) m.cut |= cut_ranges;
+    if (m.tiles_ran_out) {
+        m.cut |= cut_vertices;
+        vertices =
+            std::max<uint64_t>(vertices, 2 * uint64_t(m.limits.vertices));  // unknown: ask for twice the room
+    }
+    const auto counted = [](uint64_t n) { return uint32_t(std::min<uint64_t>(n, ~0u)); };
+    m.vertices_wanted = counted(vertices), m.indices_wanted = counted(indices),
+    m.ranges_wanted = counted(ranges);
+}
+
+uint32_t prepare_quads(void* mesher) {
+    return tasks_of(static_cast<Mesher*>(mesher)->kept, tiles_per_quick_task);
+}
+
+void run_quads(void* mesher, uint32_t task, uint32_t) {
+    const Mesher& m = *static_cast<Mesher*>(mesher);
+    for_tiles(task, tiles_per_quick_task, m.kept,
+              [&](uint32_t i) { write_tile(m, m.tiles[m.order[i].tile]); });
+}
+
+uint32_t prepare_ranges(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    Target* target = m.input.target;
+    if (!target) return 0;
+    uint32_t vertices = 0, indices = 0, ranges = 0;
+    Range range{};
+    for (uint32_t i = 0; i < m.kept; ++i) {
+        const Tile& tile = m.tiles[m.order[i].tile];
+        vertices += tile.vertex_count, indices += tile.index_count;
+        if (tile.index_count) {
+            if (range.index_count == 0) {
+                range = {ranges, tile.first_index, 0, {}, {}};
+                for (int a = 0; a < 3; ++a) range.lower[a] = tile.lower[a], range.upper[a] = tile.upper[a];
+            }
+            range.index_count += tile.index_count;
+            for (int a = 0; a < 3; ++a) {
+                range.lower[a] = std::min(range.lower[a], tile.lower[a]);
+                range.upper[a] = std::max(range.upper[a], tile.upper[a]);
+            }
+        }
+        const bool last = i + 1 == m.kept || !same_group(m, i, i + 1);
+        if (!last || range.index_count == 0) continue;
+        if (target->ranges) std::memcpy(target->ranges + ranges, &range, sizeof(range));
+        ++ranges, range.index_count = 0;
+    }
+    target->vertices_used = vertices;
+    target->indices_used = target->indices ? indices : 0;
+    target->ranges_used = target->ranges ? ranges : 0;
+    return 0;
+}
+
+}  // namespace rill

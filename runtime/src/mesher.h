@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// Inside of the mesher: what its stages share. Tiles of 8³ cells stand in a sparse hash; a tile's task
+// writes to its own tile only, and reads of other tiles only what an earlier stage has finished.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "cell_patches.h"
+#include "field_to_mesh.h"
+
+namespace rill {
+
+inline constexpr int tile_cells = 8, tile_corners = tile_cells + 1;
+inline constexpr uint32_t cells_per_tile = 512, corners_per_tile = 729, rows_per_tile = 64;
+inline constexpr uint32_t no_tile = ~0u;
+inline constexpr int farthest_tile = 1 << 20;  ///< coordinates beyond are not meshed (float runs out there)
+
+/// Cells are addressed by row = y + 8 z and bit x, corners by row = y + 9 z and bit x. Corners on a shared
+/// face stand in both tiles, with the same bits whoever evaluates them: the field is a pure function of x.
+struct Tile {
+    int32_t coord[3];
+    uint32_t vertex_count, index_count;
+    uint32_t first_vertex, first_index;
+    bool queued;                     ///< in the list of the coming round
+    bool seeded;                     ///< discs of the points are drawn into it already
+    uint8_t pending[rows_per_tile];  ///< cells to visit
+    uint8_t visited[rows_per_tile];
+    uint8_t surface[rows_per_tile];  ///< visited, with corners of both signs
+    uint64_t cross[6];               ///< cells wanted of the neighbour beyond each face, this round
+    uint16_t known[81], inside[81];  ///< corners evaluated; those of negative value
+    float lower[3], upper[3];        ///< of all vertices its triangles use
+    union {
+        float value[corners_per_tile];  ///< until the vertices are placed
+        struct {
+            uint16_t vertex[cells_per_tile];   ///< first vertex of each surface cell, from first_vertex
+            uint16_t patches[cells_per_tile];  ///< row of cell_patches
+        } placed;
+    };
+};
+
+/// Batches of positions on their way through the field; one per worker. Evaluation may reorder a batch, so
+/// `slot` travels with each position.
+struct MesherScratch {
+    static constexpr uint32_t capacity = corners_per_tile, most_candidates = 1024;
+    uint32_t candidates[most_candidates];
+    float x[capacity], y[capacity], z[capacity];
+    uint16_t slot[capacity];
+    float value[capacity], gx[capacity], gy[capacity], gz[capacity], velocity[3 * capacity];
+    // By slot, never reordered: the cell of a vertex, and a normal for where the field has none.
+    uint16_t cell[capacity];
+    float guess[3 * capacity];
+    uint16_t vertex[cells_per_tile], patches[cells_per_tile];
+    uint64_t corners_evaluated;
+};
+
+/// The field as the mesher sees it; tests put noise here.
+struct FieldAccess {
+    uint32_t (*gather)(const surface::Field&, const surface::Box&, uint32_t*, uint32_t) noexcept;
+    void (*evaluate)(const surface::Field&, const uint32_t*, uint32_t, const float*, const float*,
+                     const float*, uint32_t, float*) noexcept;
+    void (*evaluate_gradient)(const surface::Field&, const uint32_t*, uint32_t, const float*, const float*,
+                              const float*, uint32_t, float*, float*, float*, float*, float*) noexcept;
+};
+
+/// A place in the drawing order: groups of 4³ tiles one after the other, in each its tiles, z y x.
+struct OrderedTile {
+    uint64_t key;
+    uint32_t tile;
+    static constexpr uint32_t group_shift = 6;  ///< key >> group_shift names the group
+};
+
+struct Mesher {
+    MeshLimits limits;
+    MeshInput input;
+    FieldAccess access;
+    float inverse_tile;  ///< 1 / size of a tile
+    uint32_t cut;
+    uint32_t vertices_wanted, indices_wanted, ranges_wanted;
+
+    Tile* tiles;
+    uint32_t tile_count;
+    bool tiles_ran_out;
+    uint32_t* hash;  ///< tile + 1, 0 = empty
+    uint32_t hash_mask;
+    uint32_t *active, *next_active;  ///< tiles of this round, of the coming one
+    uint32_t active_count, next_active_count;
+    bool seeding;
+    uint32_t colour;  ///< of the chequerboard, whose tiles run this round
+    OrderedTile* order;
+    uint32_t order_count, kept;  ///< tiles with surface; how many of them are drawn
+    float* position;             ///< 3 per vertex, as written to the target
+    MesherScratch* scratch;      ///< one per worker
+};
+
+inline constexpr uint32_t positions_per_batch = 64;
+/// Tiles a task takes: a tile alone is too little work for an engine's job.
+inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16;
+constexpr uint32_t tasks_of(uint32_t tiles, uint32_t per_task) { return (tiles + per_task - 1) / per_task; }
+/// Runs work(tile index in the list) for the tiles of one task.
+template <typename Work>
+void for_tiles(uint32_t task, uint32_t per_task, uint32_t count, Work work) {
+    const uint32_t last = count - task * per_task < per_task ? count : (task + 1) * per_task;
+    for (uint32_t i = task * per_task; i < last; ++i) work(i);
+}
+
+// tiles.cpp
+uint32_t find_tile(const Mesher& m, const int32_t coord[3]) noexcept;
+/// no_tile when it is out of sight, out of reach, or no room is left.
+uint32_t find_or_create_tile(Mesher& m, const int32_t coord[3]) noexcept;
+/// Puts it into the list of the coming round.
+void queue_tile(Mesher& m, uint32_t tile) noexcept;
+/// Fills m.order with the tiles that have surface.
+void sort_tiles(Mesher& m) noexcept;
+
+// march.cpp: field → surface cells
+uint32_t prepare_march(void* mesher);
+void run_march(void* mesher, uint32_t task, uint32_t worker);
+
+// cells_to_vertices.cpp
+uint32_t prepare_counts(void* mesher);
+void run_counts(void* mesher, uint32_t task, uint32_t worker);
+uint32_t prepare_vertices(void* mesher);
+void run_vertices(void* mesher, uint32_t task, uint32_t worker);
+
+// mesh_to_buffers.cpp
+/// How many indices the tile's quads take.
+uint32_t count_indices(const Mesher& m, const Tile& tile) noexcept;
+/// Prefix sums over the order, cut at the capacities.
+void lay_out(Mesher& m) noexcept;
+uint32_t prepare_quads(void* mesher);
+void run_quads(void* mesher, uint32_t task, uint32_t worker);
+uint32_t prepare_ranges(void* mesher);
+
+/// Work(candidates, count, first, n) for positions [first, first + n) of the scratch. A box with too many
+/// candidates is halved down to one position, whose list is then cut: still a pure function of it.
+template <typename Work>
+void with_candidates(const Mesher& m, MesherScratch& s, uint32_t first, uint32_t n, Work&& work) {
+    if (n == 0) return;
+    surface::Box box;
+    const float* p[3] = {s.x + first, s.y + first, s.z + first};
+    uint32_t widest = 0;
+    for (uint32_t a = 0; a < 3; ++a) {
+        float lower = p[a][0], upper = p[a][0];
+        for (uint32_t i = 1; i < n; ++i) {
+            lower = p[a][i] < lower ? p[a][i] : lower;
+            upper = p[a][i] > upper ? p[a][i] : upper;
+        }
+        box.lower[a] = lower, box.upper[a] = upper;
+        if (upper - lower > box.upper[widest] - box.lower[widest]) widest = a;
+    }
+    const uint32_t count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
+    const bool fits = count <= s.most_candidates;
+    if (fits || n == 1 || !(box.upper[widest] > box.lower[widest])) {
+        work(s.candidates, fits ? count : s.most_candidates, first, n);
+        return;
+    }
+    const float middle = 0.5f * (box.lower[widest] + box.upper[widest]);
+    uint32_t split = first;
+    const auto swap = [](auto& a, auto& b) {
+        const auto t = a;
+        a = b, b = t;
+    };
+    for (uint32_t i = first; i < first + n; ++i) {
+        if (!(p[widest][i - first] < middle)) continue;
+        swap(s.x[i], s.x[split]), swap(s.y[i], s.y[split]), swap(s.z[i], s.z[split]);
+        swap(s.slot[i], s.slot[split]), ++split;
+    }
+    if (split == first || split == first + n) split = first + n / 2;  // rounding left one side empty
+    with_candidates(m, s, first, split - first, work);
+    with_candidates(m, s, split, first + n - split, work);
+}
+
+/// All n positions of the scratch, in batches with lists of their own: evaluation costs positions times
+/// candidates, so a list should hold few that matter to none of its positions.
+template <typename Work>
+void for_batches(const Mesher& m, MesherScratch& s, uint32_t n, Work&& work) {
+    for (uint32_t first = 0; first < n; first += positions_per_batch)
+        with_candidates(m, s, first, n - first < positions_per_batch ? n - first : positions_per_batch, work);
+}
+
+}  // namespace rill

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: MIT
+// The runtime, top to bottom: every stage, and the structs that pass from one to the next.
+//
+//   file → directory                        asset_to_directory.cpp      once, in poll()
+//   time, views, directory → plan, wants    view_to_wants.cpp           begin_frame()
+//   wants → reads                           wants_to_reads.cpp          begin_frame(): residency, eviction
+//   reads → chunks                          reads_to_chunks.cpp         completions; decoding in tasks
+//   chunks → points                         chunks_to_points.cpp        tasks, over coefficients_to_points.h
+//   points → field                          points_to_field.cpp         tasks, over surface/field.h
+//   field → mesh → buffers                  field_to_mesh.h             tasks
+//
+// player.cpp strings them together. Up to the reads everything is serial and cheap; the rest are
+// Stages that a Relay chains over the caller's jobs.
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "arena.h"
+#include "coefficients_to_points.h"
+#include "field_to_mesh.h"
+#include "format/check.h"
+#include "format/fourier_extension.h"
+#include "format/tracks.h"
+#include "relay.h"
+#include "rill/rill.h"
+#include "surface/field.h"
+
+namespace rill {
+
+// ---- file → directory ---------------------------------------------------------------------------
+
+/// Everything known of a file before any chunk is read. Immutable once poll() has answered ok.
+struct Directory {
+    format::Header header;
+    format::DirectoryTables tables;      ///< settings: zero-terminated
+    format::BasisTables basis;
+    AssetInfo info;
+    float layer_spacing[format::max_layers];  ///< mean over the clip, of this and coarser layers
+    uint32_t most_point_tracks, most_drop_tracks, most_chunks;  ///< of any one window
+    uint64_t suggested_resident_bytes;
+};
+double frame_time(const Directory& directory, uint32_t index) noexcept;
+/// Bytes a chunk takes of a player's residency: head, tracks, coefficients; with its read: + bytes.
+uint64_t decoded_bytes(const format::ChunkRecord& chunk) noexcept;
+uint64_t reading_bytes(const format::ChunkRecord& chunk) noexcept;
+
+/// Where a read is. The word holds ticket << 2 | state, so that a completion that is stale, doubled or
+/// meant for somebody else changes nothing.
+struct ReadSlot {
+    enum State : uint64_t { free = 0, out = 1, arrived = 2, failed = 3 };
+    std::atomic<uint64_t> word{free};
+    uint32_t chunk = 0;
+    bool forgotten = false;
+
+    State state() const noexcept { return State(word.load(std::memory_order_acquire) & 3); }
+    uint64_t ticket() const noexcept { return word.load(std::memory_order_relaxed) >> 2; }
+    void set(State state, uint64_t ticket) noexcept {
+        word.store(ticket << 2 | state, std::memory_order_release);
+    }
+    /// The one thing an IO thread does. Afterwards it must not touch the slot.
+    void complete(uint64_t ticket, bool did_arrive) noexcept;
+};
+/// A ticket says which player (0: the asset itself) and which of its slots; the rest never repeats.
+inline constexpr uint32_t most_players = 1023, most_slots = 4096;
+constexpr uint64_t make_ticket(uint64_t serial, uint32_t player, uint32_t slot) noexcept {
+    return serial << 22 | uint64_t(slot) << 10 | player;
+}
+constexpr uint32_t ticket_player(uint64_t ticket) noexcept { return ticket & 1023; }
+constexpr uint32_t ticket_slot(uint64_t ticket) noexcept { return ticket >> 10 & 4095; }
+
+}  // namespace rill
+
+struct rill::Asset {
+    rill::Host host;
+    rill::Io io;
+    uint64_t file_bytes;
+    enum class Phase { header, directory, ready, failed } phase = Phase::header;
+    rill::Status failure = rill::Status::ok;
+    rill::ReadSlot slot;                 ///< of the read below
+    uint8_t header_bytes[rill::format::header_bytes];
+    uint8_t* directory_bytes = nullptr;  ///< as read; released once it is parsed
+    void* tables = nullptr;              ///< one block: what `directory` points into
+    uint64_t tables_bytes = 0;
+    rill::Directory directory{};
+    std::atomic<uint64_t> next_serial{1};
+    std::atomic<rill::Player*> players[rill::most_players]{};
+    std::atomic<uint32_t> player_count{0};
+};
+
+namespace rill {
+
+void log(const Asset& asset, Status status, const char* message) noexcept;
+/// Asks for the header, so that it is on its way before the first poll().
+void start_asset(Asset& asset) noexcept;
+/// Moves opening on as far as arrived bytes allow: issues reads, checks, allocates. poll() in a word.
+Status advance_asset(Asset& asset) noexcept;
+/// Releases what advance_asset() allocated. No read may be out.
+void release_tables(Asset& asset) noexcept;
+
+// ---- time, views, directory → plan ----------------------------------------------------------------
+
+inline constexpr uint32_t most_views = 16;
+inline constexpr float prefetch_seconds = 1;       ///< of real time, and one window at least
+
+struct Moment {
+    uint32_t window;
+    double seconds;                ///< clamped to the clip
+    double sample;                 ///< within the window
+    double samples_per_second;
+};
+struct Want {
+    uint32_t chunk;
+    float seconds_until_needed;    ///< real seconds
+};
+struct Detail {
+    float cell_size;               ///< asset space
+    uint32_t layers;               ///< prefix wanted
+    float pixel_error;             ///< what cell_size comes to on the screen, at its nearest; 0: no view
+};
+struct Plan {
+    Moment moment;
+    float rate;
+    uint32_t view_count;
+    FrustumPlanes views[most_views];   ///< asset space
+    float eyes[most_views][3];         ///< asset space
+    Detail detail;
+    uint32_t blocks_in_view;
+    uint32_t now_count, want_count;    ///< wants[0, now_count) are of this moment, the rest is prefetch
+    Want* wants;                       ///< chunk_count of them: most important first
+    int32_t level;                     ///< cell = source's · 2^level; kept between frames (hysteresis)
+};
+Moment moment_at(const Directory& directory, double seconds) noexcept;
+/// Real seconds until `window` is needed by the play direction; what lies behind comes after all that is ahead.
+float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept;
+/// Fills everything but Plan::wants' address. `coarser`: levels to add for the sake of time.
+void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept;
+
+// ---- plan → reads → chunks ------------------------------------------------------------------------
+
+/// First fit with coalescing inside one block; neighbours found through boundary tags.
+struct Heap {
+    uint8_t* base;
+    uint64_t bytes, used;
+};
+void clear_heap(Heap& heap, void* memory, uint64_t bytes) noexcept;
+void* heap_take(Heap& heap, uint64_t bytes) noexcept;                ///< 64-byte aligned; null: no room
+void heap_trim(Heap& heap, void* block, uint64_t bytes) noexcept;    ///< gives the tail back
+void heap_give(Heap& heap, void* block) noexcept;
+
+/// undecodable: found out in this frame; rejected: its memory given back, never asked for again.
+enum class ChunkState : uint8_t { absent, reading, arrived, resident, undecodable, rejected };
+struct ChunkSlot {
+    ChunkState state;
+    uint8_t failures;              ///< reads that failed in a row
+    uint32_t rank;                 ///< in this frame's wants; unwanted: UINT32_MAX
+    uint32_t window;
+    uint32_t held;                 ///< own place in Residency::held
+    uint32_t read_slot;
+    uint64_t retry_at;             ///< frame number
+    format::TrackBlock* block;     ///< head, tracks, coefficients, bytes as read: one piece of the heap
+    const char* fault;             ///< why it is undecodable
+};
+struct Residency {
+    Asset* asset;
+    uint32_t player_index;         ///< in tickets
+    Heap heap;
+    ChunkSlot* chunks;             ///< chunk_count
+    uint32_t* held;                ///< chunks that have memory
+    uint32_t held_count;
+    uint16_t* resident_in_window;  ///< window_count
+    ReadSlot* slots;
+    uint32_t slot_count, slots_out;
+    uint32_t* to_decode;           ///< arrived chunks that this frame decodes
+    uint32_t decode_count;
+    uint64_t frame_number;
+    uint64_t frame_bytes_asked;
+    bool waiting;                  ///< Frame::wait_for_data: failed reads are repeated at once
+    bool busy;                     ///< the IO refused: not asked again in this round
+    bool no_room;                  ///< something of this moment found no memory, this frame
+    // Since create():
+    uint64_t bytes_asked, bytes_arrived;
+    uint32_t reads_refused, reads_failed, chunks_rejected, windows_decoded;
+};
+/// Takes the ranks of the last frame's wants away: before plan_frame() overwrites them.
+void drop_ranks(Residency& residency, const Plan& plan) noexcept;
+/// Gives this frame's; reads that nobody wants any more are forgotten.
+void rank_wants(Residency& residency, const Plan& plan) noexcept;
+/// Asks for what is absent, in order, as far as memory, slots and `read_bytes` go. True: something was asked.
+bool issue_reads(Residency& residency, const Directory& directory, const Plan& plan,
+                 uint64_t read_bytes) noexcept;
+/// Takes in completed reads. True: at least one arrived.
+bool collect_reads(Residency& residency, const Directory& directory) noexcept;
+/// Nothing of this moment can still arrive by waiting.
+bool is_settled(const Residency& residency, const Plan& plan) noexcept;
+void forget_reads(Residency& residency) noexcept;
+/// Chooses what this frame decodes: all of this moment, and some of the prefetch.
+void choose_decodes(Residency& residency, const Plan& plan) noexcept;
+/// One task per chunk; context Player.
+extern const Stage decode_stage;
+/// After the frame: staging back to the heap, faults counted and logged.
+void settle_decodes(Residency& residency, const Directory& directory) noexcept;
+void release_chunk(Residency& residency, uint32_t chunk) noexcept;
+
+// ---- chunks → points ------------------------------------------------------------------------------
+
+/// Up to 1024 tracks of one chunk, all points or all drops: the unit of work.
+struct Piece {
+    uint32_t chunk, first, last;
+    uint32_t active;               ///< counted
+    uint32_t offset, room;         ///< its slice of the output
+};
+inline constexpr uint32_t piece_tracks = 1024;
+struct Evaluation {
+    void* rows_memory;
+    const TimeRows* rows;
+    Piece* pieces;                 ///< (layer, block, first) ascending: what makes the order of points
+    uint32_t piece_count;
+    format::PointSet points;
+    format::DropSet drops;
+    uint32_t point_capacity, drop_capacity;
+    uint32_t points_wanted;        ///< points and drops active in the chunks drawn
+    bool cut;
+};
+inline constexpr uint32_t evaluate_stage_count = 2;
+extern const Stage evaluate_stages[evaluate_stage_count];  ///< context Player
+
+// ---- points → field → mesh ------------------------------------------------------------------------
+
+inline constexpr uint32_t field_stage_count = 2;
+/// Build and fit; finish and begin_mesh(). Context Player.
+extern const Stage field_stages[field_stage_count];
+
+}  // namespace rill
+
+struct rill::Player {
+    rill::Asset* asset;
+    const rill::Directory* directory;
+    rill::Limits limits;               ///< no zeros
+    uint64_t memory_bytes;
+    rill::Frame frame;
+    bool frame_open, started;          ///< started: the stages are chained, maybe running
+    rill::Plan plan;
+    rill::Residency residency;
+    rill::Evaluation evaluation;
+    rill::surface::Field field;
+    void* field_memory;
+    rill::Mesher* mesher;
+    rill::Relay relay;
+    uint32_t coarser;                  ///< levels given up for Budget::microseconds
+    /// A stage that only reads the clock, and only when there is a time cap.
+    struct Mark {
+        Player* player;
+        uint64_t us;
+    } decode_begun, decode_done, mesh_begun, mesh_done;
+    uint32_t plan_us, wait_us;
+};

@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: MIT
+// Building the field: grid, supports, local quadratics. Evaluation stands in field_evaluate.cpp.
+//
+// Departures from the paper, each measured on real liquids:
+//   rows      weighted by distance, only neighbours that face the same way
+//   support   follows the local spacing (distance to the 6th neighbour of the same side)
+//   curvature clamped, so that a degenerate neighbourhood gives a flat patch and never a spike
+#include "surface/field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace rill::surface {
+namespace {
+
+constexpr uint32_t most_neighbours = 14;   // rows of the fit
+constexpr uint32_t support_neighbour = 6;  // R = support_scale · distance to this one
+constexpr float support_scale = 1.4f;
+constexpr float same_side = 0.3f;          // least n·n of a row
+constexpr float most_alone = 1.8f;         // support relative to that of the points of either side
+constexpr float most_bend = 0.45f;         // |curvature|·R at most: a patch never curls over
+constexpr float ridge = 1e-3f;             // of the normalised normal equations: minimal norm when degenerate
+
+size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
+
+/// Cells of the dense grid: enough that a cell holds a few points of a surface.
+uint32_t grid_capacity(uint32_t points) { return 8 * points + 64; }
+
+struct Carver {
+    uint8_t* at;
+    template <class T> T* take(size_t count) {
+        T* block = reinterpret_cast<T*>(at);
+        at += aligned(count * sizeof(T));
+        return block;
+    }
+};
+
+void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
+    float** arrays[] = {&field.x,   &field.y,   &field.z,   &field.nx,      &field.ny,      &field.nz,
+                        &field.qxx, &field.qyy, &field.qzz, &field.qxy,     &field.qxz,     &field.qyz,
+                        &field.vx,  &field.vy,  &field.vz,  &field.support, &field.activity};
+    for (float** array : arrays) *array = carver.take<float>(points);
+    field.source = carver.take<uint32_t>(points);
+    float** drop_arrays[] = {&field.dx, &field.dy, &field.dz, &field.dvx, &field.dvy, &field.dvz,
+                             &field.radius, &field.reach, &field.drop_activity};
+    for (float** array : drop_arrays) *array = carver.take<float>(drops);
+    for (float*& array : field.inverse) array = carver.take<float>(drops);
+    field.cell_start = carver.take<uint32_t>(grid_capacity(points) + 1);
+}
+
+bool finite(const format::PointSet& p, uint32_t i) {
+    return std::isfinite(p.x[i] + p.y[i] + p.z[i] + p.nx[i] + p.ny[i] + p.nz[i]) && p.activity[i] > 0;
+}
+
+uint32_t cell_of(float x, float origin, float cell, uint32_t size) {
+    const float c = std::floor((x - origin) / cell);
+    return c <= 0 ? 0u : std::min(uint32_t(std::min(c, 1e6f)), size - 1);
+}
+uint32_t cell_index(const Field& f, float x, float y, float z) {
+    const uint32_t cx = cell_of(x, f.grid_origin[0], f.grid_cell, f.grid_size[0]);
+    const uint32_t cy = cell_of(y, f.grid_origin[1], f.grid_cell, f.grid_size[1]);
+    const uint32_t cz = cell_of(z, f.grid_origin[2], f.grid_cell, f.grid_size[2]);
+    return (cz * f.grid_size[1] + cy) * f.grid_size[0] + cx;
+}
+
+void lay_grid(Field& field, const format::PointSet& points) {
+    float lower[3] = {1e30f, 1e30f, 1e30f}, upper[3] = {-1e30f, -1e30f, -1e30f};
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < points.count; ++i) {
+        if (!finite(points, i)) continue;
+        const float p[3] = {points.x[i], points.y[i], points.z[i]};
+        for (int a = 0; a < 3; ++a) lower[a] = std::min(lower[a], p[a]), upper[a] = std::max(upper[a], p[a]);
+        ++count;
+    }
+    field.point_count = count;
+    if (count == 0) std::fill(lower, lower + 3, 0.f), std::fill(upper, upper + 3, 0.f);
+    const float longest = std::max({upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2], 1e-6f});
+    // Start from the finest sensible cell (surface spacing) and coarsen until the grid fits.
+    float cell = longest / std::max(1.f, std::sqrt(float(count)));
+    for (;; cell *= 1.2f) {
+        double cells = 1;
+        for (int a = 0; a < 3; ++a) {
+            field.grid_size[a] = uint32_t(std::min((upper[a] - lower[a]) / cell, 1e6f)) + 1;
+            cells *= field.grid_size[a];
+        }
+        if (cells <= grid_capacity(count)) break;
+    }
+    field.grid_cell = cell;
+    std::memcpy(field.grid_origin, lower, sizeof lower);
+}
+
+void sort_points(Field& f, const format::PointSet& p) {
+    const uint32_t cells = f.grid_size[0] * f.grid_size[1] * f.grid_size[2];
+    std::memset(f.cell_start, 0, (cells + 1) * sizeof(uint32_t));
+    for (uint32_t i = 0; i < p.count; ++i)
+        if (finite(p, i)) ++f.cell_start[cell_index(f, p.x[i], p.y[i], p.z[i]) + 1];
+    for (uint32_t c = 0; c < cells; ++c) f.cell_start[c + 1] += f.cell_start[c];
+    for (uint32_t i = 0; i < p.count; ++i) {
+        if (!finite(p, i)) continue;
+        const uint32_t at = f.cell_start[cell_index(f, p.x[i], p.y[i], p.z[i])]++;
+        const float length = std::sqrt(p.nx[i] * p.nx[i] + p.ny[i] * p.ny[i] + p.nz[i] * p.nz[i]);
+        const float scale = length > 0 ? 1 / length : 0;
+        f.x[at] = p.x[i], f.y[at] = p.y[i], f.z[at] = p.z[i];
+        f.nx[at] = p.nx[i] * scale, f.ny[at] = p.ny[i] * scale, f.nz[at] = p.nz[i] * scale;
+        f.vx[at] = p.vx[i], f.vy[at] = p.vy[i], f.vz[at] = p.vz[i];
+        f.activity[at] = std::min(p.activity[i], 1.f);
+        f.source[at] = i;
+    }
+    for (uint32_t c = cells; c > 0; --c) f.cell_start[c] = f.cell_start[c - 1];
+    f.cell_start[0] = 0;
+}
+
+/// Ellipsoid {c + S u}: stores S⁻¹, so that |S⁻¹ r| = 1 on the surface. A flat or broken S is skipped.
+void place_drops(Field& f, const format::DropSet& drops) {
+    f.drop_count = 0;
+    for (uint32_t i = 0; i < drops.count; ++i) {
+        float s[6];
+        for (int k = 0; k < 6; ++k) s[k] = drops.shape[k][i];
+        const float xx = s[0], yy = s[1], zz = s[2], xy = s[3], xz = s[4], yz = s[5];
+        const float c0 = yy * zz - yz * yz, c1 = xz * yz - xy * zz, c2 = xy * yz - yy * xz;
+        const float determinant = xx * c0 + xy * c1 + xz * c2;
+        const float size = std::sqrt(xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz));
+        if (!(determinant > 1e-4f * size * size * size) || !std::isfinite(determinant) ||
+            !std::isfinite(drops.x[i] + drops.y[i] + drops.z[i]) || !(drops.activity[i] > 0)) continue;
+        const uint32_t at = f.drop_count++;
+        const float k = 1 / determinant;
+        const float inverse[6] = {c0 * k, (xx * zz - xz * xz) * k, (xx * yy - xy * xy) * k,
+                                  c1 * k, c2 * k, (xy * xz - xx * yz) * k};
+        // A drop that is born or dies grows and shrinks with its activity.
+        const float grow = 1 / std::cbrt(std::max(std::min(drops.activity[i], 1.f), 1e-3f));
+        for (int a = 0; a < 6; ++a) f.inverse[a][at] = inverse[a] * grow;
+        f.dx[at] = drops.x[i], f.dy[at] = drops.y[i], f.dz[at] = drops.z[i];
+        f.dvx[at] = drops.vx[i], f.dvy[at] = drops.vy[i], f.dvz[at] = drops.vz[i];
+        f.radius[at] = std::cbrt(determinant) / grow;
+        f.reach[at] = 1.5f * size;
+        f.drop_activity[at] = drops.activity[i];
+    }
+}
+
+struct Neighbours {
+    uint32_t count = 0;
+    float any[support_neighbour];  // squared distances of the nearest of either side
+    Neighbours() { std::fill(any, any + support_neighbour, 1e30f); }
+    void offer_any(float distance2) {
+        if (distance2 >= any[support_neighbour - 1]) return;
+        uint32_t at = support_neighbour - 1;
+        for (; at > 0 && any[at - 1] > distance2; --at) any[at] = any[at - 1];
+        any[at] = distance2;
+    }
+    uint32_t id[most_neighbours];
+    float d2[most_neighbours];
+    void offer(uint32_t i, float distance2) {
+        if (count == most_neighbours && distance2 >= d2[count - 1]) return;
+        uint32_t at = count < most_neighbours ? count++ : count - 1;
+        for (; at > 0 && d2[at - 1] > distance2; --at) d2[at] = d2[at - 1], id[at] = id[at - 1];
+        d2[at] = distance2, id[at] = i;
+    }
+};
+
+/// The nearest points that face the same way as point i, ring by ring through the grid.
+Neighbours find_neighbours(const Field& f, uint32_t i) {
+    Neighbours found;
+    const float p[3] = {f.x[i], f.y[i], f.z[i]};
+    int at[3];
+    for (int a = 0; a < 3; ++a) at[a] = int(cell_of(p[a], f.grid_origin[a], f.grid_cell, f.grid_size[a]));
+    const int last_ring = int(std::max({f.grid_size[0], f.grid_size[1], f.grid_size[2]}));
+    for (int ring = 0; ring <= std::min(last_ring, 8); ++ring) {
+        // All of ring r lies beyond (r − 1) cells.
+        const float beyond = float(std::max(0, ring - 1)) * f.grid_cell;
+        if (found.count == most_neighbours && found.d2[found.count - 1] < beyond * beyond) break;
+        for (int z = std::max(0, at[2] - ring); z <= std::min(int(f.grid_size[2]) - 1, at[2] + ring); ++z)
+            for (int y = std::max(0, at[1] - ring); y <= std::min(int(f.grid_size[1]) - 1, at[1] + ring); ++y) {
+                const bool face = std::abs(z - at[2]) == ring || std::abs(y - at[1]) == ring;
+                const int step = face ? 1 : std::max(1, 2 * ring);
+                for (int x = at[0] - ring; x <= at[0] + ring; x += step) {
+                    if (x < 0 || x >= int(f.grid_size[0])) continue;
+                    const uint32_t cell = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0] + uint32_t(x);
+                    for (uint32_t j = f.cell_start[cell]; j < f.cell_start[cell + 1]; ++j) {
+                        if (j == i) continue;
+                        const float dx = f.x[j] - p[0], dy = f.y[j] - p[1], dz = f.z[j] - p[2];
+                        const float d2 = dx * dx + dy * dy + dz * dz;
+                        found.offer_any(d2);
+                        if (f.nx[j] * f.nx[i] + f.ny[j] * f.ny[i] + f.nz[j] * f.nz[i] >= same_side) found.offer(j, d2);
+                    }
+                }
+            }
+    }
+    return found;
+}
+
+/// Distance within which `support_neighbour` neighbours' worth of activity lies; interpolated, so that it
+/// moves smoothly while a point fades.
+float spacing_of(const Field& f, const Neighbours& n) {
+    float sum = 0, before = 0;
+    for (uint32_t k = 0; k < n.count; ++k) {
+        const float distance = std::sqrt(n.d2[k]), more = f.activity[n.id[k]];
+        if (sum + more >= support_neighbour) return before + (distance - before) * (support_neighbour - sum) / more;
+        sum += more, before = distance;
+    }
+    return before * 1.2f;  // fewer than six: a little patch of its own
+}
+
+struct Frame3 {
+    float t1[3], t2[3];
+};
+/// Any two unit tangents (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+Frame3 tangents(float nx, float ny, float nz) {
+    const float s = nz >= 0 ? 1.f : -1.f, a = -1 / (s + nz), b = nx * ny * a;
+    return {{1 + s * nx * nx * a, s * b, -s * nx}, {b, s + ny * ny * a, -ny}};
+}
+
+/// Minimal-norm (ridge) solution of the 3×3 normal equations.
+bool solve3(const float m[6], const float r[3], float out[3]) {
+    const float trace = m[0] + m[3] + m[5], k = ridge * trace;
+    if (!(trace > 0)) return false;
+    const double a = m[0] + k, b = m[1], c = m[2], d = m[3] + k, e = m[4], g = m[5] + k;
+    const double i0 = d * g - e * e, i1 = c * e - b * g, i2 = b * e - c * d;
+    const double determinant = a * i0 + b * i1 + c * i2;
+    if (!(determinant > 0)) return false;
+    out[0] = float((i0 * r[0] + i1 * r[1] + i2 * r[2]) / determinant);
+    out[1] = float((i1 * r[0] + (a * g - c * c) * r[1] + (b * c - a * e) * r[2]) / determinant);
+    out[2] = float((i2 * r[0] + (b * c - a * e) * r[1] + (a * d - b * b) * r[2]) / determinant);
+    return true;
+}
+
+void fit_patch(Field& f, uint32_t i) {
+    const Neighbours neighbours = find_neighbours(f, i);
+    // A lone point of its side must not reach across its whole surroundings.
+    const float around = std::sqrt(neighbours.any[support_neighbour - 1]);
+    const float spacing = std::min(spacing_of(f, neighbours), most_alone * around);
+    const float support = spacing > 0 ? support_scale * spacing : f.grid_cell;
+    f.support[i] = support;
+    float quadratic[3] = {0, 0, 0};
+    const Frame3 frame = tangents(f.nx[i], f.ny[i], f.nz[i]);
+    if (neighbours.count >= 1 && spacing > 0) {
+        const float scale = 1 / spacing;
+        const float reach = 1.15f * std::sqrt(neighbours.d2[neighbours.count - 1]) * scale;
+        float m[6] = {}, rhs[3] = {};
+        for (uint32_t k = 0; k < neighbours.count; ++k) {
+            const uint32_t j = neighbours.id[k];
+            const float r[3] = {(f.x[j] - f.x[i]) * scale, (f.y[j] - f.y[i]) * scale, (f.z[j] - f.z[i]) * scale};
+            const float u = std::sqrt(neighbours.d2[k]) * scale / reach, v = 1 - u;
+            const float w = f.activity[j] * v * v * v * v * (4 * u + 1);  // Wendland C2
+            const float t1 = r[0] * frame.t1[0] + r[1] * frame.t1[1] + r[2] * frame.t1[2];
+            const float t2 = r[0] * frame.t2[0] + r[1] * frame.t2[1] + r[2] * frame.t2[2];
+            const float h = r[0] * f.nx[i] + r[1] * f.ny[i] + r[2] * f.nz[i];
+            const float row[3] = {t1 * t1, t1 * t2, t2 * t2};
+            m[0] += w * row[0] * row[0], m[1] += w * row[0] * row[1], m[2] += w * row[0] * row[2];
+            m[3] += w * row[1] * row[1], m[4] += w * row[1] * row[2], m[5] += w * row[2] * row[2];
+            for (int a = 0; a < 3; ++a) rhs[a] -= w * row[a] * h;
+        }
+        if (!solve3(m, rhs, quadratic)) quadratic[0] = quadratic[1] = quadratic[2] = 0;
+        for (float& q : quadratic) q *= scale;  // from spacings to metres
+        // Largest |eigenvalue| of [a b/2; b/2 c].
+        const float middle = 0.5f * (quadratic[0] + quadratic[2]), half = 0.5f * (quadratic[0] - quadratic[2]);
+        const float bend = std::fabs(middle) + std::sqrt(half * half + 0.25f * quadratic[1] * quadratic[1]);
+        if (bend * support > most_bend)
+            for (float& q : quadratic) q *= most_bend / (bend * support);
+    }
+    const float *s = frame.t1, *t = frame.t2, a = quadratic[0], b = 0.5f * quadratic[1], c = quadratic[2];
+    f.qxx[i] = a * s[0] * s[0] + 2 * b * s[0] * t[0] + c * t[0] * t[0];
+    f.qyy[i] = a * s[1] * s[1] + 2 * b * s[1] * t[1] + c * t[1] * t[1];
+    f.qzz[i] = a * s[2] * s[2] + 2 * b * s[2] * t[2] + c * t[2] * t[2];
+    f.qxy[i] = a * s[0] * s[1] + b * (s[0] * t[1] + s[1] * t[0]) + c * t[0] * t[1];
+    f.qxz[i] = a * s[0] * s[2] + b * (s[0] * t[2] + s[2] * t[0]) + c * t[0] * t[2];
+    f.qyz[i] = a * s[1] * s[2] + b * (s[1] * t[2] + s[2] * t[1]) + c * t[1] * t[2];
+}
+
+}  // namespace
+
+size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
+    return 17 * aligned(points * sizeof(float)) + aligned(points * sizeof(uint32_t)) +
+           15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t));
+}
+
+void begin_field(Field& field, void* memory, const format::PointSet& points,
+                 const format::DropSet& drops) noexcept {
+    field = {};
+    carve(field, {static_cast<uint8_t*>(memory)}, points.count, drops.count);
+    lay_grid(field, points);
+    sort_points(field, points);
+    place_drops(field, drops);
+}
+
+void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
+    for (uint32_t i = first; i < last; ++i) fit_patch(field, i);
+}
+
+void finish_field(Field& f) noexcept {
+    for (int a = 0; a < 3; ++a) f.lower[a] = 1e30f, f.upper[a] = -1e30f;
+    const auto include = [&](float x, float y, float z, float r) {
+        const float p[3] = {x, y, z};
+        for (int a = 0; a < 3; ++a) {
+            f.lower[a] = std::min(f.lower[a], p[a] - r);
+            f.upper[a] = std::max(f.upper[a], p[a] + r);
+        }
+    };
+    for (uint32_t i = 0; i < f.point_count; ++i) {
+        f.largest_support = std::max(f.largest_support, f.support[i]);
+        include(f.x[i], f.y[i], f.z[i], f.support[i]);
+    }
+    for (uint32_t i = 0; i < f.drop_count; ++i) {
+        f.largest_reach = std::max(f.largest_reach, f.reach[i]);
+        include(f.dx[i], f.dy[i], f.dz[i], f.reach[i]);
+    }
+}
+
+}  // namespace rill::surface

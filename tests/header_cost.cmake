@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: MIT
+# cmake -D compiler= -D include= -D work= -P header_cost.cmake
+# Every public header compiles alone as an engine would build it, and costs at most 500 preprocessed lines.
+cmake_minimum_required(VERSION 3.25)
+file(GLOB headers RELATIVE ${include} ${include}/rill/*.h)
+if(NOT headers)
+  message(FATAL_ERROR "no public headers under ${include}")
+endif()
+foreach(header ${headers})
+  file(WRITE ${work}/include.cpp "#include <${header}>\n")
+  set(command ${compiler} -std=c++17 -fno-exceptions -fno-rtti -Wall -Wextra -Wpedantic -Werror
+    -I${include} ${work}/include.cpp)
+  execute_process(COMMAND ${command} -fsyntax-only RESULT_VARIABLE failed)
+  if(failed)
+    message(FATAL_ERROR "${header} does not compile alone")
+  endif()
+  execute_process(COMMAND ${command} -E -P -o ${work}/include.i COMMAND_ERROR_IS_FATAL ANY)
+  file(READ ${work}/include.i text)
+  string(REGEX MATCHALL "\n" lines "${text}")
+  list(LENGTH lines count)
+  message(STATUS "${header}: ${count} preprocessed lines")
+  if(count GREATER 500)
+    message(FATAL_ERROR "${header} costs ${count} preprocessed lines, more than 500")
+  endif()
+endforeach()

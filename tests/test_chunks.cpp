@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: MIT
+// Quantising, coding and decoding of tracks: what goes in comes out to the bit, within the promised error, and no
+// bytes whatever do harm.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "format/lattice.h"
+#include "layers_to_chunks.h"
+#include "mesh.h"
+#include "src/coefficients_to_points.h"
+
+using namespace rill;
+using namespace rill::cooker;
+
+namespace {
+
+constexpr uint32_t window = 25;
+const Quantiser quantiser{0.002f, 4.f, 0.035f, 0.004f, 0.06f};
+const glm::vec3 origin(0.5f, -0.25f, 1.f);
+
+struct Tables {
+    std::vector<double> memory;
+    format::BasisTables tables;
+    explicit Tables(uint32_t longest) : memory(format::basis_tables_bytes(longest) / sizeof(double)) {
+        format::build_basis_tables(tables, memory.data(), longest);
+    }
+};
+const format::BasisTables& tables() {
+    static Tables built(format::max_window_samples);
+    return built.tables;
+}
+
+/// A point of a travelling wave, or a drop flying by.
+TrackSamples make_track(std::mt19937& random, uint32_t birth, uint32_t death, bool drop, float violence = 1) {
+    std::uniform_real_distribution<float> unit(-1, 1);
+    TrackSamples track;
+    track.birth = uint8_t(birth), track.death = uint8_t(death), track.drop = drop;
+    if (birth > 0) track.flags |= format::track_born;
+    if (death < window - 1) track.flags |= format::track_dies;
+    const glm::vec2 start(unit(random), unit(random));
+    const float flip = random() % 4 == 0 ? -1.f : 1.f;  // floors face down
+    for (uint32_t s = birth; s <= death; ++s) {
+        const float t = s / 24.f * violence;
+        const glm::vec2 x = start + 0.1f * t * glm::vec2(1, -0.5f);
+        const float phase = 5 * x.x + 3 * x.y + 4 * t;
+        const float height = 0.05f * std::sin(phase);
+        track.position.push_back(glm::vec3(x, height) + origin);
+        const glm::vec2 slope = 0.05f * std::cos(phase) * glm::vec2(5, 3);
+        if (drop)
+            track.shape.push_back({0.02f, 0.021f, 0.019f, 0.001f * std::sin(9 * t), 0.f, 0.002f});
+        else
+            track.normal.push_back(flip * glm::normalize(glm::vec3(-slope, 1)));
+    }
+    return track;
+}
+std::vector<QuantisedTrack> make_tracks(uint32_t points, uint32_t drops, uint32_t seed = 1) {
+    std::mt19937 random(seed);
+    std::vector<QuantisedTrack> out;
+    for (uint32_t i = 0; i < points + drops; ++i) {
+        uint32_t birth = random() % 3 ? 0 : random() % window,
+                 death = random() % 3 ? window - 1 : random() % window;
+        if (birth > death) std::swap(birth, death);
+        out.push_back(
+            quantise_track(make_track(random, birth, death, i >= points), quantiser, origin, tables()));
+    }
+    return out;
+}
+
+struct Decoded {
+    Status status;
+    const char* reason = nullptr;
+    std::unique_ptr<format::Track[]> tracks;  // exactly sized: a write past the end is seen by the sanitizer
+    std::unique_ptr<float[]> coefficients;
+    format::TrackBlock block{};
+};
+Decoded decode(const uint8_t* bytes, size_t size, const format::ChunkShape& shape) {
+    Decoded d;
+    d.tracks.reset(new format::Track[shape.point_count + shape.drop_count]);
+    d.coefficients.reset(new float[shape.coefficient_count]);
+    d.block.tracks = d.tracks.get(), d.block.coefficients = d.coefficients.get();
+    const std::unique_ptr<uint8_t[]> exact(new uint8_t[size]);
+    std::copy(bytes, bytes + size, exact.get());
+    d.status = format::decode_chunk(exact.get(), size, shape, nullptr, 0, d.block, &d.reason);
+    return d;
+}
+EncodedChunk encode(const std::vector<QuantisedTrack>& tracks) {
+    return encode_chunk(tracks, quantiser, origin, window, {});
+}
+
+/// A track as its decoded numbers: comparable, sortable.
+std::vector<float> numbers(const format::Track& t, const float* coefficients, bool drop) {
+    std::vector<float> out = {float(drop),    float(t.birth),          float(t.death),
+                              float(t.flags), float(t.position_terms), float(t.second_terms)};
+    const float* at = coefficients + t.first_coefficient;
+    out.insert(out.end(), at, at + t.position_terms * 3 + t.second_terms * (drop ? 6 : 3));
+    return out;
+}
+std::vector<std::vector<float>> all_numbers(const format::TrackBlock& block) {
+    std::vector<std::vector<float>> out;
+    for (uint32_t i = 0; i < block.point_count + block.drop_count; ++i)
+        out.push_back(numbers(block.tracks[i], block.coefficients, i >= block.point_count));
+    std::sort(out.begin(), out.end());
+    return out;
+}
+/// The same straight from the quantised tracks, without any coding.
+std::vector<std::vector<float>> expected_numbers(const std::vector<QuantisedTrack>& tracks) {
+    const format::LatticeSteps steps{quantiser.step,
+                                     quantiser.normal_step,
+                                     {origin.x, origin.y, origin.z},
+                                     uint16_t(quantiser.tangent_ratio * 16)};
+    std::vector<std::vector<float>> out;
+    for (const QuantisedTrack& q : tracks) {
+        format::RawTrack raw{};
+        const uint32_t channels = q.drop ? 6 : 3;
+        raw.birth = q.birth, raw.death = q.death, raw.flags = q.flags;
+        raw.position_terms = uint8_t(q.position.size() / 3),
+        raw.second_terms = uint8_t(q.second.size() / channels);
+        std::copy(q.lattice, q.lattice + 3, raw.lattice);
+        std::copy(q.axis, q.axis + 2, raw.axis);
+        for (size_t i = 0; i < q.position.size(); ++i) raw.position[i / 3][i % 3] = q.position[i];
+        for (size_t i = 0; i < q.second.size(); ++i) raw.second[i / channels][i % channels] = q.second[i];
+        std::vector<float> memory(q.position.size() + q.second.size());
+        format::Track record;
+        format::TrackBlock block{{}, !q.drop, q.drop, uint32_t(memory.size()), &record, memory.data()};
+        REQUIRE(format::place_track(raw, steps, q.drop, block, 0, 0));
+        format::finish_block(steps, block);
+        out.push_back(numbers(record, memory.data(), q.drop));
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+}  // namespace
+
+TEST_CASE("a chunk decodes to exactly the quantised tracks") {
+    const std::pair<uint32_t, uint32_t> sizes[] = {{0, 0},   {1, 0},   {0, 1},     {2, 1},
+                                                   {40, 30}, {500, 0}, {5000, 200}};
+    for (const auto& [points, drops] : sizes) {
+        INFO(points, " points, ", drops, " drops");
+        const auto tracks = make_tracks(points, drops);
+        const EncodedChunk chunk = encode(tracks);
+        CHECK(chunk.shape.point_count == points);
+        CHECK(chunk.shape.drop_count == drops);
+        const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
+        INFO((d.reason ? d.reason : ""));
+        REQUIRE(d.status == Status::ok);
+        CHECK(d.block.coefficient_count == chunk.shape.coefficient_count);
+        CHECK(d.block.origin[0] == origin.x);
+        CHECK(all_numbers(d.block) == expected_numbers(tracks));
+    }
+}
+
+TEST_CASE("the bytes do not depend on the order of the tracks, nor on the run") {
+    auto tracks = make_tracks(300, 20);
+    for (int i = 0; i < 4; ++i) {  // several tracks on one lattice point
+        tracks.push_back(tracks[5]);
+        tracks.back().axis[0] += i / 2;
+    }
+    const EncodedChunk chunk = encode(tracks);
+    const double bits =
+        chunk.bits.structure + chunk.bits.births + chunk.bits.motion + chunk.bits.normals + chunk.bits.drops;
+    CHECK(std::abs(bits / 8 + format::lattice_steps_bytes - chunk.bytes.size()) < 4);
+    std::mt19937 random(3);
+    for (int i = 0; i < 3; ++i) {
+        std::shuffle(tracks.begin(), tracks.end(), random);
+        CHECK(encode(tracks).bytes == chunk.bytes);
+    }
+}
+
+TEST_CASE("normals in every direction survive, also on the folds of the octahedron") {
+    std::vector<QuantisedTrack> tracks;
+    for (int x = -4; x <= 4; ++x)
+        for (int y = -4; y <= 4; ++y)
+            for (int z = -4; z <= 4; ++z) {
+                if (x == 0 && y == 0 && z == 0) continue;
+                const glm::vec3 n = glm::normalize(glm::vec3(x, y, z));
+                const TrackSamples track{0, 0, 0, false, {origin + n}, {n}, {}};
+                tracks.push_back(quantise_track(track, quantiser, origin, tables()));
+                const glm::vec3 back = dequantise_track(tracks.back(), quantiser, origin, tables()).normal[0];
+                CHECK(glm::dot(back, n) > std::cos(1.1f * quantiser.normal_step));
+            }
+    const EncodedChunk chunk = encode(tracks);
+    const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
+    REQUIRE(d.status == Status::ok);
+    CHECK(all_numbers(d.block) == expected_numbers(tracks));
+}
+
+TEST_CASE("lives of every length keep the promised error") {
+    std::mt19937 random(7);
+    for (uint32_t life = 1; life <= 33; ++life)
+        for (int repeat = 0; repeat < 20; ++repeat) {
+            const bool drop = repeat % 5 == 4;
+            TrackSamples track = make_track(random, 0, life - 1, drop, repeat < 10 ? 1.f : 8.f);
+            const QuantisedTrack q = quantise_track(track, quantiser, origin, tables());
+            const TrackSamples back = dequantise_track(q, quantiser, origin, tables());
+            REQUIRE(back.position.size() == life);
+            INFO("life ", life, " repeat ", repeat);
+            // Truncation, half a step of the mean, and the dead zone (.62 of a coefficient step) in every term, which
+            // in the norm add up as a root; 1.5 for the ends, where basis functions are larger.
+            const double terms = format::most_terms(life, (q.flags & format::track_cosine) != 0);
+            const auto noise = [&](double gain) { return float(0.5 + 1.5 * 0.62 * gain * std::sqrt(terms)); };
+            const float bound = quantiser.time_tolerance + quantiser.step * noise(format::position_gain);
+            const float normal_bound =
+                quantiser.normal_tolerance + quantiser.normal_step * noise(format::normal_gain);
+            for (uint32_t s = 0; s < life; ++s) {
+                const glm::vec3 offset = back.position[s] - track.position[s];
+                if (drop) {
+                    CHECK(glm::length(offset) < 1.8f * bound);
+                    for (int c = 0; c < 6; ++c)
+                        CHECK(std::abs(back.shape[s][c] - track.shape[s][c]) < 1.5f * bound);
+                } else {
+                    CHECK(std::abs(glm::dot(offset, track.normal[s])) < bound);
+                    CHECK(glm::length(offset) < std::sqrt(2.f) * quantiser.tangent_ratio * bound);
+                    CHECK(std::acos(std::min(1.f, glm::dot(back.normal[s], track.normal[s]))) <
+                          std::sqrt(2.f) * normal_bound);
+                }
+            }
+        }
+}
+
+TEST_CASE("a normal that turns far, and one that turns over, stay decodable and near") {
+    for (const float turn : {1.2f, 2.5f}) {
+        TrackSamples track;
+        track.birth = 0, track.death = 24;
+        for (int s = 0; s < 25; ++s) {
+            const float a = turn * (s / 24.f - 0.5f);
+            track.normal.push_back({std::sin(a), 0, std::cos(a)});
+            track.position.push_back(origin + 0.3f * track.normal.back());
+        }
+        const QuantisedTrack q = quantise_track(track, quantiser, origin, tables());
+        CHECK(((q.flags & format::track_fine) != 0) == (turn > 2));
+        const TrackSamples back = dequantise_track(q, quantiser, origin, tables());
+        for (int s = 0; s < 25; ++s) {
+            CHECK(glm::dot(back.normal[s], track.normal[s]) > std::cos(0.12f));
+            CHECK(std::abs(glm::dot(back.position[s] - track.position[s], track.normal[s])) < 0.008f);
+        }
+    }
+}
+
+TEST_CASE("the projection is asked for every sample and obeyed") {
+    std::mt19937 random(5);
+    const TrackSamples track = make_track(random, 0, 24, false);
+    std::vector<int> asked(25);
+    const auto onto_plane = [&](uint32_t sample, const glm::vec3& x, const glm::vec3& axis) {
+        ++asked[sample];
+        return (origin.z + 0.2f - x.z) / axis.z;  // a surface elsewhere than the samples: the plane z = 0.2
+    };
+    const QuantisedTrack q = quantise_track(track, quantiser, origin, tables(), onto_plane);
+    for (const int count : asked) CHECK(count > 0);
+    for (const glm::vec3& x : dequantise_track(q, quantiser, origin, tables()).position)
+        CHECK(std::abs(x.z - origin.z - 0.2f) < 0.008f);
+}
+
+TEST_CASE("wrong tracks are refused with words, not coded") {
+    std::mt19937 random(5);
+    TrackSamples track = make_track(random, 0, 24, false);
+    track.normal.pop_back();
+    CHECK_THROWS_AS(quantise_track(track, quantiser, origin, tables()), InputError);
+    track = make_track(random, 0, 24, false);
+    track.position[3].x = NAN;
+    CHECK_THROWS_AS(quantise_track(track, quantiser, origin, tables()), InputError);
+    auto tracks = make_tracks(3, 0);
+    tracks[1].position.resize(3 * 30);
+    CHECK_THROWS_AS(encode(tracks), InputError);
+    tracks = make_tracks(3, 0);
+    tracks[1].death = 60;
+    CHECK_THROWS_AS(encode(tracks), InputError);
+    CHECK_THROWS_AS(encode_chunk({}, Quantiser{0, 4, 0.03f, 1, 1}, origin, window, {}), InputError);
+}
+
+TEST_CASE("truncated, lengthened, flipped and random bytes are refused or harmless") {
+    const EncodedChunk chunk = encode(make_tracks(60, 6));
+    size_t accepted = 0;
+    for (size_t size = 0; size < chunk.bytes.size(); ++size) {
+        const Decoded d = decode(chunk.bytes.data(), size, chunk.shape);
+        CHECK(d.status == Status::corrupt);
+        CHECK(d.reason != nullptr);
+    }
+    for (const uint8_t garbage : {0, 1, 255}) {
+        auto longer = chunk.bytes;
+        longer.push_back(garbage);
+        CHECK(decode(longer.data(), longer.size(), chunk.shape).status == Status::corrupt);
+    }
+    for (size_t i = 0; i < chunk.bytes.size() * 8; ++i) {
+        auto bytes = chunk.bytes;
+        bytes[i / 8] ^= uint8_t(1u << (i % 8));
+        const Decoded d = decode(bytes.data(), bytes.size(), chunk.shape);
+        accepted += d.status == Status::ok && i >= format::lattice_steps_bytes * 8;
+    }
+    CHECK(accepted < chunk.bytes.size() * 8 / 4);
+    std::mt19937 random(11);
+    for (int i = 0; i < 2000; ++i) {
+        std::vector<uint8_t> bytes(random() % 400);
+        for (uint8_t& b : bytes) b = uint8_t(random() % 7 ? random() : 0);
+        if (i % 2 && bytes.size() > format::lattice_steps_bytes)
+            std::copy(chunk.bytes.begin(), chunk.bytes.begin() + format::lattice_steps_bytes, bytes.begin());
+        const format::ChunkShape shape{uint32_t(1 + random() % 65), uint32_t(random() % 3000),
+                                       uint32_t(random() % 50), uint32_t(random() % 20000)};
+        decode(bytes.data(), bytes.size(), shape);
+    }
+    // Wrong shapes for good bytes.
+    for (int field = 0; field < 3; ++field)
+        for (const int by : {-1, 1}) {
+            format::ChunkShape shape = chunk.shape;
+            (field == 0   ? shape.point_count
+             : field == 1 ? shape.drop_count
+                          : shape.coefficient_count) += uint32_t(by);
+            CHECK(decode(chunk.bytes.data(), chunk.bytes.size(), shape).status == Status::corrupt);
+        }
+}
+
+TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact velocity") {
+    std::mt19937 random(2);
+    std::vector<TrackSamples> truth;
+    std::vector<QuantisedTrack> tracks;
+    for (const auto& [birth, death] : {std::pair{0u, 24u}, {3u, 9u}, {20u, 20u}, {5u, 24u}}) {
+        const TrackSamples t = make_track(random, birth, death, false);
+        tracks.push_back(quantise_track(t, quantiser, origin, tables()));
+        truth.push_back(dequantise_track(tracks.back(), quantiser, origin, tables()));
+    }
+    const EncodedChunk chunk = encode(tracks);
+    const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
+    REQUIRE(d.status == Status::ok);
+    std::vector<float> memory(10 * 4);
+    std::vector<uint64_t> rows_memory(time_rows_bytes(window) / 8 + 1);
+    const auto evaluate = [&](double s, uint32_t capacity, format::PointSet& points) {
+        float** const streams[] = {&points.x,  &points.y,  &points.z,  &points.nx, &points.ny,
+                                   &points.nz, &points.vx, &points.vy, &points.vz, &points.activity};
+        for (int i = 0; i < 10; ++i) *streams[i] = memory.data() + 4 * i;
+        points.count = 0;
+        format::DropSet drops{};
+        return evaluate_tracks(place_time_rows(rows_memory.data(), tables(), window, s, 24), d.block, 0, 4,
+                               capacity, 0, points, drops);
+    };
+    format::PointSet points{};
+    for (int s = 0; s < int(window); ++s) {
+        uint32_t expected = 0;
+        const uint32_t active = evaluate(s, 4, points);
+        for (const TrackSamples& t : truth) {
+            if (s < t.birth || s > t.death) continue;
+            ++expected;
+            float nearest = 1e9f;
+            for (uint32_t i = 0; i < points.count; ++i)
+                nearest = std::min(nearest, glm::length(glm::vec3(points.x[i], points.y[i], points.z[i]) -
+                                                        t.position[size_t(s - t.birth)]) +
+                                                1 - points.activity[i]);
+            CHECK(nearest < 2e-6f);
+        }
+        CHECK(active == expected);
+        CHECK(evaluate(s, 1, points) == expected);  // too small: told how many
+        CHECK(points.count == std::min(expected, 1u));
+    }
+    CHECK(evaluate(2.25, 4, points) == 2);  // the second is on its way in
+    CHECK(*std::min_element(points.activity, points.activity + 2) == doctest::Approx(0.25));
+    CHECK(evaluate(2.0, 4, points) == 1);
+    CHECK(evaluate(9.75, 4, points) == 3);
+    CHECK(*std::min_element(points.activity, points.activity + 3) == doctest::Approx(0.25));
+    CHECK(evaluate(20.5, 4, points) == 3);  // a life of one sample fades on both sides
+    evaluate(12.0, 4, points);
+    const glm::vec3 x(points.x[0], points.y[0], points.z[0]), v(points.vx[0], points.vy[0], points.vz[0]);
+    evaluate(12.05, 4, points);
+    const glm::vec3 later(points.x[0], points.y[0], points.z[0]);
+    CHECK(glm::length((later - x) / (0.05f / 24) - v) < 0.02f);
+    CHECK(std::abs(glm::length(glm::vec3(points.nx[0], points.ny[0], points.nz[0])) - 1) < 1e-5f);
+}

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: MIT
+// The `rill` tool as scripts see it: exit codes, messages, files left and not left behind.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+#include <sys/wait.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "readers/reader.h"
+#include "sequence_files.h"
+#include "shapes.h"
+
+using namespace rill::cooker;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Result {
+    int code = -1;
+    std::string text;  // standard output and error
+};
+Result run_rill(const std::string& arguments) {
+    Result result;
+    FILE* pipe = popen((std::string("'" RILL_TOOL "' ") + arguments + " 2>&1").c_str(), "r");
+    REQUIRE(pipe);
+    char part[4096];
+    for (size_t size; (size = fread(part, 1, sizeof part, pipe)) > 0;) result.text.append(part, size);
+    const int status = pclose(pipe);
+    result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+    return result;
+}
+bool has(const Result& result, const std::string& part) { return result.text.find(part) != std::string::npos; }
+nlohmann::json json_of(const std::string& path) { return nlohmann::json::parse(get_file(path), nullptr, false); }
+
+/// A bumpy ball on its way along x: six frames, cooked once for all tests.
+struct Clip {
+    TestFolder folder;
+    std::string input = folder / "ball", asset = folder / "ball.rill", report = folder / "report.json";
+    Result cooked;
+    static Mesh frame(int number) {
+        Mesh mesh = bumpy_sphere(32, 0.5f, {0.02f * float(number), 0, 0.5f});
+        mesh.velocities.assign(mesh.positions.size(), {0.48f, 0, 0});
+        return mesh;
+    }
+    Clip() {
+        for (int number = 3; number <= 8; ++number) put_file(input + "/frame_000" + std::to_string(number) + ".ply", plain_ply(frame(number)));
+        cooked = run_rill("cook " + input + " -o " + asset + " --error 0.5e --window 3 --jobs 2 --report " + report);
+    }
+};
+const Clip& clip() {
+    static const Clip clip;
+    return clip;
+}
+
+}  // namespace
+
+TEST_CASE("usage: help is 0, mistakes are 1 and name the option") {
+    CHECK(run_rill("--help").code == 0);
+    CHECK(has(run_rill("--help"), "verify"));
+    CHECK(run_rill("cook --help").code == 0);
+    CHECK(run_rill("--version").code == 0);
+    CHECK(run_rill("").code == 1);
+    CHECK(run_rill("boil").code == 1);
+    CHECK(run_rill("cook").code == 1);
+    const TestFolder folder;
+    const std::string somewhere = " -o " + (folder / "a.rill");
+    CHECK(run_rill("cook " + clip().input).code == 1);
+    for (const char* bad : {"--error 3x", "--error -1e", "--frames a:b", "--frames 5:3", "--frames 1:2:0", "--frames 1:2:3:4", "--fps -3",
+                            "--velocity-unit hour", "--velocity estimate", "--jobs -1", "--window 0", "--nonsense"}) {
+        CAPTURE(bad);
+        const Result result = run_rill("cook " + clip().input + somewhere + " " + bad);
+        CAPTURE(result.text);
+        CHECK(result.code == 1);
+        CHECK(has(result, std::string(bad).substr(0, std::string(bad).find(' '))));
+    }
+    CHECK(!fs::exists(folder / "a.rill"));
+}
+
+TEST_CASE("cook: an asset, a report, nothing left beside them") {
+    CAPTURE(clip().cooked.text);
+    REQUIRE(clip().cooked.code == 0);
+    CHECK(fs::file_size(clip().asset) > 100);
+    CHECK(json_of(clip().report).is_object());
+    CHECK(std::distance(fs::directory_iterator(clip().folder.path), {}) == 3);
+    CHECK(has(clip().cooked, "cook"));  // progress, in plain lines
+}
+
+TEST_CASE("cook: --quiet says nothing, and the same input gives the same bytes at any number of jobs") {
+    const TestFolder folder;
+    const Result quiet = run_rill("cook " + clip().input + " -o " + (folder / "b.rill") + " --error 0.5e --window 3 --jobs 1 --quiet");
+    CHECK(quiet.code == 0);
+    CHECK(quiet.text == "");
+    CHECK(get_file(folder / "b.rill") == get_file(clip().asset));
+}
+
+TEST_CASE("cook: a recipe, over which the command line goes") {
+    const TestFolder folder;
+    const std::string recipe = folder / "r.json";
+    put_file(recipe, R"({"error": "0.5e", "window": 3, "jobs": 2})");
+    CHECK(run_rill("cook " + clip().input + " -o " + (folder / "b.rill") + " --quiet --recipe " + recipe).code == 0);
+    CHECK(get_file(folder / "b.rill") == get_file(clip().asset));
+    put_file(recipe, R"({"error": "9x", "window": 3})");
+    CHECK(run_rill("cook " + clip().input + " -o " + (folder / "c.rill") + " --quiet --error 0.5e --recipe " + recipe).code == 0);
+    CHECK(get_file(folder / "c.rill") == get_file(clip().asset));
+    CHECK(run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe).code == 1);
+    put_file(recipe, R"({"eror": "1e"})");
+    CHECK(has(run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe), "eror"));
+    put_file(recipe, "[");
+    CHECK(run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe).code == 2);
+}
+
+TEST_CASE("cook: bad input is 2, one line, and no asset") {
+    const TestFolder folder;
+    const std::string asset = folder / "a.rill", input = folder / "in";
+    auto check = [&](const std::string& cause) {
+        const Result result = run_rill("cook " + input + " -o " + asset + " --quiet");
+        CAPTURE(result.text);
+        CHECK(result.code == 2);
+        CHECK(has(result, cause));
+        CHECK(std::count(result.text.begin(), result.text.end(), '\n') == 1);
+        CHECK(std::distance(fs::directory_iterator(folder.path), {}) == (fs::exists(input) ? 1 : 0));
+    };
+    check("no such file");
+    fs::create_directories(input);
+    check("empty");
+    Mesh still = Clip::frame(1);
+    still.velocities.clear();
+    put_file(input + "/f1.ply", plain_ply(still));
+    check("no velocity");
+    for (int number : {1, 2, 4}) put_file(input + "/f" + std::to_string(number) + ".ply", plain_ply(Clip::frame(number)));
+    check("frame 3 is missing");
+    Mesh bad = Clip::frame(3);
+    bad.positions[7].x = std::nanf("");
+    put_file(input + "/f3.ply", plain_ply(bad));
+    check("f3.ply: position of vertex 7");
+    put_file(input + "/f3.ply", plain_ply(Clip::frame(3)).substr(0, 5000));
+    check("f3.ply");
+    const Result result = run_rill("cook " + clip().input + " -o " + (folder / "no/where.rill") + " --quiet");
+    CHECK(result.code == 2);
+    CHECK(has(result, "where.rill"));
+}
+
+TEST_CASE("cook: a single frame, and frames without liquid") {
+    const TestFolder folder;
+    put_file(folder / "one/f7.ply", plain_ply(Clip::frame(7)));
+    const Result one = run_rill("cook " + (folder / "one") + " -o " + (folder / "one.rill") + " --error 1e");
+    CAPTURE(one.text);
+    CHECK(one.code == 0);
+    CHECK(run_rill("verify " + (folder / "one.rill") + " " + (folder / "one")).code == 0);
+    put_file(folder / "none/f1.ply", plain_ply(Mesh{}));
+    put_file(folder / "none/f2.ply", plain_ply(Mesh{}));
+    const Result none = run_rill("cook " + (folder / "none") + " -o " + (folder / "none.rill"));
+    CAPTURE(none.text);
+    CHECK(none.code == 0);
+    CHECK(run_rill("verify " + (folder / "none.rill") + " " + (folder / "none")).code == 0);
+    CHECK(run_rill("export " + (folder / "none.rill") + " -o " + (folder / "n%d.glb")).code == 0);
+}
+
+TEST_CASE("info") {
+    const Result text = run_rill("info " + clip().asset), as_json = run_rill("info --json " + clip().asset);
+    CHECK(text.code == 0);
+    CHECK(has(text, "windows"));
+    CHECK(has(text, "layers"));
+    const nlohmann::json json = nlohmann::json::parse(as_json.text, nullptr, false);
+    REQUIRE(json.is_object());
+    CHECK(json["frames"] == 6);
+    CHECK(json["first_frame"] == 3);
+    CHECK(json["file_bytes"] == fs::file_size(clip().asset));
+    CHECK(json["windows"].size() >= 2);
+}
+
+TEST_CASE("assets that are none: 2, whatever the command") {
+    const TestFolder folder;
+    const std::string bytes = get_file(clip().asset);
+    REQUIRE(bytes.size() > 200);
+    put_file(folder / "short.rill", bytes.substr(0, bytes.size() / 2));
+    put_file(folder / "empty.rill", "");
+    put_file(folder / "other.rill", plain_ply(Clip::frame(1)));
+    std::string flipped = bytes;
+    flipped[60] = char(flipped[60] ^ 1);
+    put_file(folder / "flipped.rill", flipped);
+    for (const char* name : {"short.rill", "empty.rill", "other.rill", "flipped.rill", "missing.rill"})
+        for (const std::string& command : {"info " + (folder / name), "verify " + (folder / name) + " " + clip().input,
+                                           "export " + (folder / name) + " -o " + (folder / "x%d.ply"), "bench " + (folder / name)}) {
+            CAPTURE(command);
+            const Result result = run_rill(command);
+            CAPTURE(result.text);
+            CHECK(result.code == 2);
+            CHECK(has(result, name));
+        }
+}
+
+TEST_CASE("verify: meets its target, and says so in JSON and HTML") {
+    const TestFolder folder;
+    const Result result = run_rill("verify " + clip().asset + " " + clip().input + " --json " + (folder / "v.json") + " --html " + (folder / "v.html"));
+    CAPTURE(result.text);
+    CHECK(result.code == 0);
+    CHECK(has(result, "worst frame"));
+    const nlohmann::json json = json_of(folder / "v.json");
+    REQUIRE(json.is_object());
+    CHECK(json["frames"].size() == 6);
+    CHECK(json["frames"][0]["frame"] == 3);
+    CHECK(json["target"]["met"] == true);
+    CHECK(json["summary"]["p99_m"].get<double>() <= 1.1 * json["target"]["p99_m"].get<double>());
+    CHECK(json["frames"][2]["source"]["components"] == 1);
+    const std::string page = get_file(folder / "v.html");
+    CHECK(page.find("<svg") != std::string::npos);
+    CHECK(page.find("data:image/png;base64,") != std::string::npos);
+    CHECK(page.find("http") == std::string::npos);  // fetches nothing
+
+    const Result part = run_rill("verify " + clip().asset + " " + clip().input + " --frames 4:8:2 --json -");
+    const nlohmann::json some = nlohmann::json::parse(part.text.substr(std::min(part.text.size(), part.text.find('{'))), nullptr, false);
+    REQUIRE(some.is_object());
+    CHECK(some["frames"].size() == 3);
+    CHECK(run_rill("verify " + clip().asset + " " + clip().input + " --frames 4:9").code == 2);
+}
+
+TEST_CASE("verify: another surface than the one cooked misses the target: 3") {
+    const TestFolder folder;
+    for (int number = 3; number <= 8; ++number) {
+        Mesh mesh = Clip::frame(number);
+        for (glm::vec3& x : mesh.positions) x.z += 0.2f;
+        put_file(folder / ("in/f" + std::to_string(number) + ".ply"), plain_ply(mesh));
+    }
+    const Result result = run_rill("verify " + clip().asset + " " + (folder / "in"));
+    CHECK(result.code == 3);
+    CHECK(has(result, "target missed"));
+    fs::remove(folder / "in/f8.ply");
+    CHECK(run_rill("verify " + clip().asset + " " + (folder / "in")).code == 2);
+}
+
+TEST_CASE("export: meshes that lie on the source, with normals and velocity") {
+    const TestFolder folder;
+    const Result result = run_rill("export " + clip().asset + " -o " + (folder / "out_%03d.ply") + " --frames 3:7:2");
+    CAPTURE(result.text);
+    REQUIRE(result.code == 0);
+    const auto reader = open_sequence(folder.path.string(), {});
+    CHECK(reader->info().numbers == std::vector<int>{3, 5, 7});
+    const Mesh mesh = reader->read(1);
+    REQUIRE(!mesh.triangles.empty());
+    CHECK(signed_volume(mesh) == doctest::Approx(signed_volume(Clip::frame(5))).epsilon(0.05));
+    CHECK(get_file(folder / "out_003.ply").find("property float nx") != std::string::npos);
+    double speed = 0;
+    for (const glm::vec3& v : mesh.velocities) speed += v.x;
+    CHECK(speed / double(mesh.velocities.size()) == doctest::Approx(0.48).epsilon(0.3));
+
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "mid.glb") + " --time 0.0625").code == 0);
+    CHECK(get_file(folder / "mid.glb").substr(0, 4) == "glTF");
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "coarse.obj") + " --frames 4 --cell 0.2 --layers 1").code == 0);
+    CHECK(fs::file_size(folder / "coarse.obj") < fs::file_size(folder / "mid.glb"));
+
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "all.ply")).code == 1);
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "a%d.stl")).code == 1);
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "b.ply") + " --time 99").code == 1);
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "c%d.ply") + " --frames 1:4").code == 2);
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "no/d%d.ply") + " --frames 4").code == 2);
+    for (const auto& entry : fs::directory_iterator(folder.path)) CHECK(entry.path().extension() != ".partial");
+}
+
+TEST_CASE("bench: no allocation in frames, one output whatever the order and the workers") {
+    const TestFolder folder;
+    const Result result = run_rill("bench " + clip().asset + " --jobs 2 --json " + (folder / "b.json"));
+    CAPTURE(result.text);
+    REQUIRE(result.code == 0);
+    const nlohmann::json json = json_of(folder / "b.json");
+    CHECK(json["allocations_in_frames"] == 0);
+    CHECK(json["output_identical"] == true);
+    CHECK(json["passes"].size() == 6);
+    CHECK(json["scaling"].size() == 2);
+    CHECK(json["draco"]["triangles_per_second"].get<double>() > 0);
+}
+
+TEST_CASE("compare: Draco's size falls and its error grows with fewer bits") {
+    const TestFolder folder;
+    const Result result = run_rill("compare " + clip().input + " --asset " + clip().asset + " --frames 3:7:4 --json " + (folder / "c.json"));
+    CAPTURE(result.text);
+    REQUIRE(result.code == 0);
+    const nlohmann::json json = json_of(folder / "c.json");
+    REQUIRE(json["rivals"].size() == 2);
+    const nlohmann::json& points = json["rivals"][0]["points"];
+    REQUIRE(points.size() == 5);
+    for (size_t i = 1; i < points.size(); ++i) {
+        CHECK(points[i]["bytes_per_frame"].get<double>() > points[i - 1]["bytes_per_frame"].get<double>());
+        CHECK(points[i]["mean_m"].get<double>() < points[i - 1]["mean_m"].get<double>());
+    }
+    CHECK(json["rill"]["bytes_per_frame"].get<double>() > 0);
+}

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+// The time basis: orthonormal on the samples, bounded between them, and as good as a Fourier extension should be.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "format/fourier_extension.h"
+#include "format/layout.h"
+
+using namespace rill::format;
+
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+
+struct Tables {
+    std::vector<double> memory = std::vector<double>(basis_tables_bytes(max_window_samples) / sizeof(double));
+    BasisTables tables;
+    Tables() { build_basis_tables(tables, memory.data(), max_window_samples); }
+};
+const BasisTables& tables() {
+    static Tables built;
+    return built.tables;
+}
+
+struct Row {
+    float value[max_terms], derivative[max_terms];
+};
+Row row(uint32_t samples, bool cosine, double s, uint32_t terms) {
+    Row r{};
+    basis_row(tables(), samples, cosine, s, terms, r.value, r.derivative);
+    return r;
+}
+
+/// Least squares in the first `terms` functions; the signal is a function of x in [−1, 1].
+struct Fit {
+    uint32_t samples, terms;
+    bool cosine;
+    std::vector<double> c;
+    Fit(uint32_t samples, uint32_t terms, bool cosine, const std::function<double(double)>& f)
+        : samples(samples), terms(terms), cosine(cosine), c(terms) {
+        for (uint32_t s = 0; s < samples; ++s) {
+            const Row r = row(samples, cosine, s, terms);
+            for (uint32_t k = 0; k < terms; ++k) c[k] += f(x_at(s)) * r.value[k];
+        }
+    }
+    double x_at(double s) const { return samples > 1 ? 2 * s / (samples - 1) - 1 : 0; }
+    double operator()(double s) const {
+        const Row r = row(samples, cosine, s, terms);
+        double sum = 0;
+        for (uint32_t k = 0; k < terms; ++k) sum += c[k] * r.value[k];
+        return sum;
+    }
+    /// Largest error at samples (steps = 1) or at so many places between them.
+    double worst(const std::function<double(double)>& f, int steps) const {
+        double worst = 0;
+        for (uint32_t i = 0; i <= (samples - 1) * steps; ++i) {
+            const double s = double(i) / steps;
+            worst = std::max(worst, std::abs((*this)(s)-f(x_at(s))));
+        }
+        return worst;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("the functions are orthonormal on the samples of every life length") {
+    for (uint32_t samples = 1; samples <= max_window_samples; ++samples)
+        for (const bool cosine : {false, true}) {
+            const uint32_t terms = most_terms(samples, cosine);
+            REQUIRE(terms >= 1);
+            REQUIRE(terms <= samples);
+            double worst = 0;
+            std::vector<Row> rows;
+            for (uint32_t s = 0; s < samples; ++s) rows.push_back(row(samples, cosine, s, terms));
+            for (uint32_t i = 0; i < terms; ++i)
+                for (uint32_t j = 0; j <= i; ++j) {
+                    double dot = i == j ? -1 : 0;
+                    for (const Row& r : rows) dot += double(r.value[i]) * r.value[j];
+                    worst = std::max(worst, std::abs(dot));
+                }
+            INFO("samples ", samples, cosine ? " cosine" : " extension");
+            CHECK(worst < 3e-7);  // what rounding to float leaves
+        }
+}
+
+TEST_CASE("closed forms: constant and straight lines at every length, in one and two terms") {
+    for (uint32_t samples = 1; samples <= max_window_samples; ++samples) {
+        INFO("samples ", samples);
+        CHECK(Fit(samples, 1, false, [](double) { return 3.0; }).worst([](double) { return 3.0; }, 16) <
+              3e-6);
+        const auto line = [](double x) { return 0.5 - 2 * x; };
+        if (samples > 1) CHECK(Fit(samples, 2, false, line).worst(line, 16) < 5e-6);
+        // The constant's coefficient is mean · √samples.
+        CHECK(Fit(samples, 1, false, [](double) { return 1.0; }).c[0] == doctest::Approx(std::sqrt(samples)));
+    }
+    for (const uint32_t samples : {1u, 5u, 25u})  // DCT-II
+        for (uint32_t k = 0; k < most_terms(samples, true); ++k)
+            for (double s = 0; s <= samples - 1.0; s += 0.25)
+                CHECK(row(samples, true, s, k + 1).value[k] ==
+                      doctest::Approx(std::sqrt((k ? 2.0 : 1.0) / samples) *
+                                      std::cos(pi * k * (s + 0.5) / samples))
+                          .epsilon(1e-5));
+}
+
+TEST_CASE("what lies in the space comes back exactly, between the samples too") {
+    for (const uint32_t samples : {9u, 16u, 25u, 33u, 49u}) {
+        const uint32_t terms = most_terms(samples, false);
+        for (uint32_t k = 1; 2 * k + 1 < terms && k <= 6; ++k) {
+            INFO("samples ", samples, " harmonic ", k);
+            const auto cosine = [k](double x) { return std::cos(k * pi * x / 2); };
+            const auto sine = [k](double x) { return std::sin(k * pi * x / 2); };
+            CHECK(Fit(samples, 2 * k + 1, false, cosine).worst(cosine, 16) < 1e-5);
+            CHECK(Fit(samples, 2 * k + 2, false, sine).worst(sine, 16) < 1e-5);
+        }
+    }
+}
+
+TEST_CASE("smooth signals stay bounded between the samples at full rank, at every length") {
+    const std::function<double(double)> signals[] = {
+        [](double x) { return std::exp(2 * x); }, [](double x) { return std::sin(9 * x + 1); },
+        [](double x) { return 1 / (1 + 8 * x * x); }, [](double x) { return std::abs(x - 0.3); }};
+    for (uint32_t samples = 2; samples <= max_window_samples; ++samples)
+        for (const auto& f : signals) {
+            const Fit fit(samples, most_terms(samples, false), false, f);
+            double at_samples = 0, between = 0;
+            for (uint32_t i = 0; i <= (samples - 1) * 16; ++i) {
+                const double s = i / 16.0;
+                between = std::max(between, std::abs(fit(s)));
+                if (i % 16 == 0) at_samples = std::max(at_samples, std::abs(f(fit.x_at(s))));
+            }
+            INFO("samples ", samples);
+            CHECK(between <= 1.5 * at_samples);
+        }
+}
+
+TEST_CASE("worst growth between samples (Lebesgue constant) at the lives of a 25-sample window") {
+    for (uint32_t samples = 1; samples <= 25; ++samples) {
+        const uint32_t terms = most_terms(samples, false);
+        std::vector<Row> rows;
+        for (uint32_t s = 0; s < samples; ++s) rows.push_back(row(samples, false, s, terms));
+        double worst = 0;
+        for (uint32_t i = 0; i <= (samples - 1) * 16; ++i) {
+            const Row at = row(samples, false, i / 16.0, terms);
+            double sum = 0;
+            for (const Row& r : rows) {
+                double kernel = 0;
+                for (uint32_t k = 0; k < terms; ++k) kernel += double(at.value[k]) * r.value[k];
+                sum += std::abs(kernel);
+            }
+            worst = std::max(worst, sum);
+        }
+        INFO("samples ", samples);
+        CHECK(worst < 3.6);
+    }
+}
+
+TEST_CASE("convergence is super-algebraic") {
+    const std::function<double(double)> signals[] = {[](double x) { return std::exp(x); },
+                                                     [](double x) { return std::sin(3 * x + 0.5); }};
+    for (const auto& f : signals) {
+        const double four = Fit(33, 4, false, f).worst(f, 16), eight = Fit(33, 8, false, f).worst(f, 16),
+                     twelve = Fit(33, 12, false, f).worst(f, 16);
+        CHECK(eight < four / 64);  // algebraic of order 6 would just do it
+        CHECK(twelve < 1e-5);
+        CHECK(eight < 2e-3);
+        CHECK(twelve < eight / 20);
+    }
+}
+
+TEST_CASE("the derivative is that of the value; outside, the tangent goes on") {
+    for (const uint32_t samples : {2u, 5u, 25u, 65u})
+        for (const bool cosine : {false, true}) {
+            const uint32_t terms = std::min(most_terms(samples, cosine), 14u);
+            for (double s = 0.5; s < samples - 1; s += 0.7) {
+                const Row low = row(samples, cosine, s - 0.01, terms),
+                          high = row(samples, cosine, s + 0.01, terms), at = row(samples, cosine, s, terms);
+                for (uint32_t k = 0; k < terms; ++k)
+                    CHECK(std::abs((high.value[k] - low.value[k]) / 0.02 - at.derivative[k]) < 4e-3);
+            }
+            const double end = samples - 1;
+            const Row last = row(samples, cosine, end, terms), past = row(samples, cosine, end + 0.75, terms),
+                      first = row(samples, cosine, 0, terms), before = row(samples, cosine, -0.5, terms);
+            for (uint32_t k = 0; k < terms; ++k) {
+                CHECK(past.value[k] ==
+                      doctest::Approx(last.value[k] + 0.75f * last.derivative[k]).epsilon(1e-4));
+                CHECK(before.value[k] ==
+                      doctest::Approx(first.value[k] - 0.5f * first.derivative[k]).epsilon(1e-4));
+                CHECK(past.derivative[k] == last.derivative[k]);
+            }
+        }
+}
+
+TEST_CASE("a life of one sample is a constant") {
+    const Row at = row(1, false, 0.6, 1);
+    CHECK(at.value[0] == 1.f);
+    CHECK(at.derivative[0] == 0.f);
+}
