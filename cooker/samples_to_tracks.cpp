@@ -42,6 +42,9 @@ std::optional<SurfacePoint> hold(const SurfaceFrame& frame, const glm::vec3& x, 
     if (glm::length(on - p) > 2 * frame.edge) on = p;
     SurfacePoint held{on, n, {}};
     if (!settle(frame, radius, held) || glm::length(held.position - x) > reach) return {};
+    // A fit may reach beyond what carries it: there must be surface where the point now stands.
+    const uint32_t under = nearest_facing(frame, held.position, held.normal, 8);
+    if (under == ~0u || glm::distance(frame.mesh.positions[under], held.position) > 1.2f * frame.edge) return {};
     return held;
 }
 

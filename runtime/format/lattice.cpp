@@ -79,9 +79,6 @@ void nearest_axis(const int64_t direction[3], int32_t levels, int32_t axis[2]) n
         v = (levels - magnitude(u)) * sign_of(v);
         u = fold;
     }
-    // On the rim two pairs mean one direction: keep the one that mirroring in z = 0 restores.
-    if (magnitude(u) == levels) v = magnitude(v);
-    if (magnitude(v) == levels) u = magnitude(u);
     axis[0] = int32_t(u), axis[1] = int32_t(v);
 }
 

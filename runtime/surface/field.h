@@ -62,7 +62,8 @@ void finish_field(Field& field) noexcept;
 uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capacity) noexcept;
 
 /// Field values at n positions, from candidates that gather() gave for a box holding them all.
-/// Where no patch has weight the plane of the nearest point decides; where none is near: +unsupported.
+/// Where no patch has weight: negative (with no gradient) in the liquid, +unsupported in the air, by the winding
+/// number of all points.
 inline constexpr float unsupported = 1e30f;
 void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
               const float* x, const float* y, const float* z, uint32_t n, float* value) noexcept;

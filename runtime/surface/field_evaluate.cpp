@@ -23,6 +23,10 @@ namespace rill::surface {
 namespace {
 
 constexpr uint32_t lanes = 32;
+// u² = (|r|² + flatten · (n·r)²) / R²: a patch reaches half as far along its normal as along the surface, or the
+// wide patches of a calm far side would speak for fine surface nearby.
+constexpr float flatten = 3;
+constexpr float core = 0.5f;            // of u²: some patch this near, or the winding number decides
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
 constexpr float opposed_reach = 0.51f;  // (1/1.4)²: cluster B has weight only within R/1.4
 constexpr float soften = 1e-4f;         // of u² in the weight (1 − u)² / u²
@@ -30,7 +34,7 @@ constexpr float soften = 1e-4f;         // of u² in the weight (1 − u)² / u�
 struct Positions {
     float x[lanes], y[lanes], z[lanes];
 };
-/// The point nearest to each position among those whose support holds it.
+/// The point nearest to each position among those whose core holds it.
 struct Nearest {
     float key[lanes];  // squared distance / activity; a point that fades recedes
     float x[lanes], y[lanes], z[lanes], nx[lanes], ny[lanes], nz[lanes];
@@ -51,11 +55,11 @@ RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = candidates[c];
         const float xj = f.x[j], yj = f.y[j], zj = f.z[j], nx = f.nx[j], ny = f.ny[j], nz = f.nz[j];
-        const float reach = f.support[j] * f.support[j], recede = 1 / f.activity[j];
+        const float reach = core * f.support[j] * f.support[j], recede = 1 / f.activity[j];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
-            const float d2 = rx * rx + ry * ry + rz * rz;
-            const float key = d2 < reach ? d2 * recede : unsupported;
+            const float d2 = rx * rx + ry * ry + rz * rz, h = nx * rx + ny * ry + nz * rz;
+            const float key = d2 + flatten * h * h < reach ? d2 * recede : unsupported;
             const bool nearer = key < n.key[l];
             n.key[l] = nearer ? key : n.key[l];
             n.x[l] = nearer ? xj : n.x[l], n.y[l] = nearer ? yj : n.y[l], n.z[l] = nearer ? zj : n.z[l];
@@ -74,10 +78,11 @@ RILL_KERNEL void blend_values(const Field& f, const uint32_t* candidates, uint32
                     yz = 2 * f.qyz[j], inverse = 1 / (f.support[j] * f.support[j]), activity = f.activity[j];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
-            const float u2 = (rx * rx + ry * ry + rz * rz) * inverse;
+            const float h = nx * rx + ny * ry + nz * rz;
+            const float u2 = (rx * rx + ry * ry + rz * rz + flatten * h * h) * inverse;
             const float u = std::sqrt(std::min(u2, 1.f)), v = 1 - u;
             const float w = activity * v * v / (u2 + soften);
-            const float g = nx * rx + ny * ry + nz * rz + rx * (xx * rx + xy * ry + xz * rz) +
+            const float g = h + rx * (xx * rx + xy * ry + xz * rz) +
                             ry * (yy * ry + yz * rz) + zz * rz * rz;
             const bool against = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l] < opposed;
             const float wa = against ? 0 : w, wb = against && u2 < opposed_reach ? w : 0;
@@ -99,7 +104,8 @@ RILL_KERNEL void blend_gradients(const Field& f, const uint32_t* candidates, uin
         const float activity = f.activity[j], vx = f.vx[j], vy = f.vy[j], vz = f.vz[j];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
-            const float u2 = (rx * rx + ry * ry + rz * rz) * inverse;
+            const float h = nx * rx + ny * ry + nz * rz, lean = flatten * h;
+            const float u2 = (rx * rx + ry * ry + rz * rz + lean * h) * inverse;
             const float u = std::sqrt(std::min(u2, 1.f)), v = 1 - u, s = 1 / (u2 + soften);
             const bool against = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l] < opposed;
             const bool mine = bool(chosen[l]) && against == want_opposed && (!against || u2 < opposed_reach);
@@ -108,52 +114,42 @@ RILL_KERNEL void blend_gradients(const Field& f, const uint32_t* candidates, uin
             const float slope = -2 * keep * v * s * inverse * (1 / std::max(u, 1e-4f) + v * s);
             const float hx = xx * rx + xy * ry + xz * rz, hy = xy * rx + yy * ry + yz * rz,
                         hz = xz * rx + yz * ry + zz * rz;
-            const float g = nx * rx + ny * ry + nz * rz + 0.5f * (rx * hx + ry * hy + rz * hz);
+            const float g = h + 0.5f * (rx * hx + ry * hy + rz * hz);
+            const float dx = slope * (rx + lean * nx), dy = slope * (ry + lean * ny), dz = slope * (rz + lean * nz);
             k.weight[l] += w, k.sum[l] += w * g;
-            k.gx[l] += w * (nx + hx) + g * slope * rx, k.wx[l] += slope * rx, k.vx[l] += w * vx;
-            k.gy[l] += w * (ny + hy) + g * slope * ry, k.wy[l] += slope * ry, k.vy[l] += w * vy;
-            k.gz[l] += w * (nz + hz) + g * slope * rz, k.wz[l] += slope * rz, k.vz[l] += w * vz;
+            k.gx[l] += w * (nx + hx) + g * dx, k.wx[l] += dx, k.vx[l] += w * vx;
+            k.gy[l] += w * (ny + hy) + g * dy, k.wy[l] += dy, k.vy[l] += w * vy;
+            k.gz[l] += w * (nz + hz) + g * dz, k.wz[l] += dz, k.vz[l] += w * vz;
         }
     }
 }
 
-struct Plane {
-    float value, nx, ny, nz;
-    uint32_t point;
-};
-/// Beyond all supports the plane of the nearest point decides: it keeps deep liquid inside where points are
-/// missing. Beside the rim of a thin sheet there is air, not more sheet.
-Plane far_plane(const Field& f, float x, float y, float z) {
-    const float p[3] = {x, y, z};
-    int at[3];
-    for (int a = 0; a < 3; ++a)
-        at[a] = int(std::clamp((p[a] - f.grid_origin[a]) / f.grid_cell, -4.f, float(f.grid_size[a]) + 3.f));
-    float best = unsupported;
-    uint32_t nearest = ~0u;
-    for (int ring = 0; ring <= 4 && f.point_count; ++ring) {
-        const float beyond = float(std::max(0, ring - 1)) * f.grid_cell;
-        if (best < beyond * beyond) break;
-        for (int cz = at[2] - ring; cz <= at[2] + ring; ++cz)
-            for (int cy = at[1] - ring; cy <= at[1] + ring; ++cy)
-                for (int cx = at[0] - ring; cx <= at[0] + ring; ++cx) {
-                    if (std::max({std::abs(cx - at[0]), std::abs(cy - at[1]), std::abs(cz - at[2])}) != ring) continue;
-                    if (cx < 0 || cy < 0 || cz < 0 || cx >= int(f.grid_size[0]) || cy >= int(f.grid_size[1]) ||
-                        cz >= int(f.grid_size[2])) continue;
-                    const uint32_t cell = (uint32_t(cz) * f.grid_size[1] + uint32_t(cy)) * f.grid_size[0] + uint32_t(cx);
-                    for (uint32_t j = f.cell_start[cell]; j < f.cell_start[cell + 1]; ++j) {
-                        const float rx = x - f.x[j], ry = y - f.y[j], rz = z - f.z[j];
-                        const float d2 = (rx * rx + ry * ry + rz * rz) / f.activity[j];
-                        if (d2 < best) best = d2, nearest = j;
-                    }
-                }
+/// Winding number of the points as oriented discs at each position (Barill et al. 2018, equation 5): about 1 in
+/// the liquid, 0 in the air. Beyond all supports it gives a sign that holes and stray points cannot turn.
+RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* winding) {
+    for (uint32_t l = 0; l < lanes; ++l) winding[l] = 0;
+    for (uint32_t j = 0; j < f.point_count; ++j) {
+        const float xj = f.x[j], yj = f.y[j], zj = f.z[j];
+        // The area a point stands for, from the distance to its 6th neighbour; over 4 pi.
+        const float area = 0.0197f * f.support[j] * f.support[j] * f.activity[j];
+        const float nx = area * f.nx[j], ny = area * f.ny[j], nz = area * f.nz[j];
+        for (uint32_t l = 0; l < lanes; ++l) {
+            const float rx = xj - p.x[l], ry = yj - p.y[l], rz = zj - p.z[l];
+            const float d2 = rx * rx + ry * ry + rz * rz + 1e-20f;
+            winding[l] += (nx * rx + ny * ry + nz * rz) / (d2 * std::sqrt(d2));
+        }
     }
-    if (nearest == ~0u) return {unsupported, 0, 0, 1, ~0u};
-    const uint32_t j = nearest;
-    const float rx = x - f.x[j], ry = y - f.y[j], rz = z - f.z[j];
-    const float distance = std::sqrt(rx * rx + ry * ry + rz * rz);
-    const float height = f.nx[j] * rx + f.ny[j] * ry + f.nz[j] * rz;
-    if (std::fabs(height) < 0.4f * distance) return {distance, rx / distance, ry / distance, rz / distance, j};
-    return {height, f.nx[j], f.ny[j], f.nz[j], j};
+}
+
+/// Signs for the first n positions where no patch has weight.
+void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& nearest, float* value) {
+    bool any = false;
+    for (uint32_t l = 0; l < n; ++l) any |= nearest.key[l] >= unsupported;
+    if (!any) return;
+    float winding[lanes];
+    if (f.point_count) winding_numbers(f, p, winding);
+    for (uint32_t l = 0; l < n; ++l)
+        if (nearest.key[l] >= unsupported) value[l] = f.point_count && winding[l] > 0.5f ? -f.grid_cell : unsupported;
 }
 
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t first, uint32_t count, const float* x,
@@ -203,16 +199,14 @@ void blend(const Field& f, const uint32_t* candidates, uint32_t points, const fl
     blend_values(f, candidates, points, k.p, k.nearest, k.a, k.b, k.side);
     for (uint32_t l = 0; l < n; ++l) {
         k.use_b[l] = 0;
-        if (!(k.a.weight[l] > 0)) {
-            k.value[l] = far_plane(f, x[l], y[l], z[l]).value;
-            continue;
-        }
+        if (k.nearest.key[l] >= unsupported) continue;
         k.value[l] = k.a.sum[l] / k.a.weight[l];
         if (!(k.b.weight[l] > 0)) continue;
         const float other = k.b.sum[l] / k.b.weight[l];
         k.use_b[l] = k.side[l] < 0 ? other > k.value[l] : other < k.value[l];
         if (k.use_b[l]) k.value[l] = other;
     }
+    decide_far(f, k.p, n, k.nearest, k.value);
 }
 
 uint32_t count_points(const Field& f, const uint32_t* candidates, uint32_t count) {
@@ -291,11 +285,9 @@ void evaluate_gradient(const Field& f, const uint32_t* candidates, uint32_t cand
         for (uint32_t l = 0; l < some; ++l) {
             const uint32_t i = first + l;
             value[i] = k.value[l];
-            if (!(sum.weight[l] > 0)) {
-                const Plane far = far_plane(f, x[i], y[i], z[i]);
-                gx[i] = far.nx, gy[i] = far.ny, gz[i] = far.nz;
-                const bool known = far.point != ~0u;
-                if (vx) vx[i] = known ? f.vx[far.point] : 0, vy[i] = known ? f.vy[far.point] : 0, vz[i] = known ? f.vz[far.point] : 0;
+            if (k.nearest.key[l] >= unsupported || !(sum.weight[l] > 0)) {
+                gx[i] = gy[i] = gz[i] = 0;
+                if (vx) vx[i] = vy[i] = vz[i] = 0;
                 continue;
             }
             const float s = 1 / sum.weight[l];
