@@ -375,9 +375,12 @@ struct Playing {
         target.index_capacity = index_count;
         target.range_capacity = range_count;
     }
-    rill::Status draw(double seconds) {
+    rill::Status draw(double seconds) { return run(seconds, &target); }
+    /// The same without a mesh.
+    rill::Status stream(double seconds) { return run(seconds, nullptr); }
+    rill::Status run(double seconds, rill::Target* into) {
         frame.seconds = seconds;
-        frame.target = &target;
+        frame.target = into;
         CHECK(rill::begin_frame(player, frame) == rill::Status::ok);
         return rill::end_frame(player, &stats);
     }

@@ -294,16 +294,16 @@ TEST_CASE("a small residency holds the coarse and gives up the rest") {
         limits.resident_bytes = bytes;
         Playing playing(opened, limits);
         for (const double t : {0.0, 0.1, 0.4, 0.5, 0.9, 0.2, 0.0}) {
-            const Status status = playing.draw(t);
+            const Status status = playing.stream(t);
             CHECK(status >= Status::ok);
             CHECK(playing.stats.bytes_resident <= bytes);
             if (playing.stats.chunks_late) CHECK(playing.stats.cut == rill::cut_residency);
             else CHECK(status == Status::ok);
         }
         const uint64_t asked = playing.stats.bytes_asked;
-        for (int i = 0; i < 5; ++i) playing.draw(0.0);
+        for (int i = 0; i < 5; ++i) playing.stream(0.0);
         const uint64_t settled = playing.stats.bytes_asked;
-        for (int i = 0; i < 5; ++i) playing.draw(0.0);
+        for (int i = 0; i < 5; ++i) playing.stream(0.0);
         CHECK(playing.stats.bytes_asked == settled);  // standing still nothing is thrown out and read again
         if (bytes > whole / 8) CHECK(asked > 0);
     }

@@ -8,6 +8,7 @@
 //   chunks → points                         chunks_to_points.cpp        tasks, over coefficients_to_points.h
 //   points → field                          points_to_field.cpp         tasks, over surface/field.h
 //   field → mesh → buffers                  field_to_mesh.h             tasks
+//   frame → stats                           frame_to_stats.cpp          end_frame()
 //
 // player.cpp strings them together. Up to the reads everything is serial and cheap; the rest are
 // Stages that a Relay chains over the caller's jobs.
@@ -255,3 +256,12 @@ struct rill::Player {
     } decode_begun, decode_done, mesh_begun, mesh_done;
     uint32_t plan_us, wait_us;
 };
+
+namespace rill {
+
+// ---- frame → stats ----------------------------------------------------------------------------------
+
+/// After the last stage and settle_decodes(). Also steers Player::coarser.
+Stats count_all(Player& player) noexcept;
+
+}  // namespace rill

@@ -26,17 +26,21 @@ constexpr uint32_t lanes = 32;
 // u² = (|r|² + flatten · (n·r)²) / R²: a patch reaches half as far along its normal as along the surface, or the
 // wide patches of a calm far side would speak for fine surface nearby.
 constexpr float flatten = 3;
-constexpr float core = 0.5f;            // of u²: some patch this near, or the winding number decides
+constexpr float core = 0.3f;            // of u²: the nearest point is this near, or the winding number decides
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
+constexpr float agreeing = 0.7f;        // above this: full weight in A; between, patches of another face fade out
+constexpr float gate_scale = 1 / (agreeing - opposed);
 constexpr float opposed_reach = 0.51f;  // (1/1.4)²: cluster B has weight only within R/1.4
 constexpr float soften = 1e-4f;         // of u² in the weight (1 − u)² / u²
 
 struct Positions {
     float x[lanes], y[lanes], z[lanes];
 };
-/// The point nearest to each position among those whose core holds it.
+/// The point nearest to each position among those whose support holds it.
 struct Nearest {
     float key[lanes];  // squared distance / activity; a point that fades recedes
+    float u2[lanes];   // of that point
+    bool far(uint32_t l) const { return u2[l] > core; }
     float x[lanes], y[lanes], z[lanes], nx[lanes], ny[lanes], nz[lanes];
 };
 struct Cluster {
@@ -49,18 +53,19 @@ struct Cluster {
 RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32_t count, const Positions& p,
                               Nearest& n) {
     for (uint32_t l = 0; l < lanes; ++l) {
-        n.key[l] = unsupported;
+        n.key[l] = n.u2[l] = unsupported;
         n.x[l] = n.y[l] = n.z[l] = n.nx[l] = n.ny[l] = n.nz[l] = 0;
     }
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = candidates[c];
         const float xj = f.x[j], yj = f.y[j], zj = f.z[j], nx = f.nx[j], ny = f.ny[j], nz = f.nz[j];
-        const float reach = core * f.support[j] * f.support[j], recede = 1 / f.activity[j];
+        const float reach = f.support[j] * f.support[j], recede = 1 / f.activity[j];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
             const float d2 = rx * rx + ry * ry + rz * rz, h = nx * rx + ny * ry + nz * rz;
-            const float key = d2 + flatten * h * h < reach ? d2 * recede : unsupported;
+            const float key = d2 < reach ? d2 * recede : unsupported;
             const bool nearer = key < n.key[l];
+            n.u2[l] = nearer ? (d2 + flatten * h * h) / reach : n.u2[l];
             n.key[l] = nearer ? key : n.key[l];
             n.x[l] = nearer ? xj : n.x[l], n.y[l] = nearer ? yj : n.y[l], n.z[l] = nearer ? zj : n.z[l];
             n.nx[l] = nearer ? nx : n.nx[l], n.ny[l] = nearer ? ny : n.ny[l], n.nz[l] = nearer ? nz : n.nz[l];
@@ -84,8 +89,10 @@ RILL_KERNEL void blend_values(const Field& f, const uint32_t* candidates, uint32
             const float w = activity * v * v / (u2 + soften);
             const float g = h + rx * (xx * rx + xy * ry + xz * rz) +
                             ry * (yy * ry + yz * rz) + zz * rz * rz;
-            const bool against = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l] < opposed;
-            const float wa = against ? 0 : w, wb = against && u2 < opposed_reach ? w : 0;
+            const float agree = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l];
+            const bool against = agree < opposed;
+            const float gate = std::min(std::max((agree - opposed) * gate_scale, 0.f), 1.f);
+            const float wa = w * gate * gate, wb = against && u2 < opposed_reach ? w : 0;
             a.weight[l] += wa, a.sum[l] += wa * g;
             b.weight[l] += wb, b.sum[l] += wb * g;
             side[l] += wb * (n.nx[l] * (xj - n.x[l]) + n.ny[l] * (yj - n.y[l]) + n.nz[l] * (zj - n.z[l]));
@@ -107,9 +114,11 @@ RILL_KERNEL void blend_gradients(const Field& f, const uint32_t* candidates, uin
             const float h = nx * rx + ny * ry + nz * rz, lean = flatten * h;
             const float u2 = (rx * rx + ry * ry + rz * rz + lean * h) * inverse;
             const float u = std::sqrt(std::min(u2, 1.f)), v = 1 - u, s = 1 / (u2 + soften);
-            const bool against = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l] < opposed;
+            const float agree = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l];
+            const bool against = agree < opposed;
+            const float gate = std::min(std::max((agree - opposed) * gate_scale, 0.f), 1.f);
             const bool mine = bool(chosen[l]) && against == want_opposed && (!against || u2 < opposed_reach);
-            const float keep = mine ? activity : 0;
+            const float keep = mine ? (against ? activity : activity * gate * gate) : 0;
             const float w = keep * v * v * s;
             const float slope = -2 * keep * v * s * inverse * (1 / std::max(u, 1e-4f) + v * s);
             const float hx = xx * rx + xy * ry + xz * rz, hy = xy * rx + yy * ry + yz * rz,
@@ -144,12 +153,12 @@ RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* wind
 /// Signs for the first n positions where no patch has weight.
 void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& nearest, float* value) {
     bool any = false;
-    for (uint32_t l = 0; l < n; ++l) any |= nearest.key[l] >= unsupported;
+    for (uint32_t l = 0; l < n; ++l) any |= nearest.far(l);
     if (!any) return;
     float winding[lanes];
     if (f.point_count) winding_numbers(f, p, winding);
     for (uint32_t l = 0; l < n; ++l)
-        if (nearest.key[l] >= unsupported) value[l] = f.point_count && winding[l] > 0.5f ? -f.grid_cell : unsupported;
+        if (nearest.far(l)) value[l] = f.point_count && winding[l] > 0.5f ? -f.grid_cell : unsupported;
 }
 
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t first, uint32_t count, const float* x,
@@ -199,7 +208,7 @@ void blend(const Field& f, const uint32_t* candidates, uint32_t points, const fl
     blend_values(f, candidates, points, k.p, k.nearest, k.a, k.b, k.side);
     for (uint32_t l = 0; l < n; ++l) {
         k.use_b[l] = 0;
-        if (k.nearest.key[l] >= unsupported) continue;
+        if (k.nearest.far(l)) continue;
         k.value[l] = k.a.sum[l] / k.a.weight[l];
         if (!(k.b.weight[l] > 0)) continue;
         const float other = k.b.sum[l] / k.b.weight[l];
@@ -285,7 +294,7 @@ void evaluate_gradient(const Field& f, const uint32_t* candidates, uint32_t cand
         for (uint32_t l = 0; l < some; ++l) {
             const uint32_t i = first + l;
             value[i] = k.value[l];
-            if (k.nearest.key[l] >= unsupported || !(sum.weight[l] > 0)) {
+            if (k.nearest.far(l) || !(sum.weight[l] > 0)) {
                 gx[i] = gy[i] = gz[i] = 0;
                 if (vx) vx[i] = vy[i] = vz[i] = 0;
                 continue;

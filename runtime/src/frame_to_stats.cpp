@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// What a frame did → Stats: what was there, what was held back and why, and how long it took.
+#include <algorithm>
+
+#include "pipeline.h"
+
+namespace rill {
+namespace {
+
+/// What of this moment is there, by block and by layer.
+void count_drawn(const Player& player, Stats& stats) {
+    uint64_t drawn[format::max_blocks / 64] = {};
+    uint32_t missing_layer = player.plan.detail.layers;
+    for (uint32_t i = 0; i < player.plan.now_count; ++i) {
+        const uint32_t chunk = player.plan.wants[i].chunk;
+        const ChunkState state = player.residency.chunks[chunk].state;
+        const format::ChunkRecord& record = player.directory->tables.chunks[chunk];
+        if (state == ChunkState::resident) {
+            uint64_t& word = drawn[record.block / 64];
+            const uint64_t bit = uint64_t(1) << (record.block % 64);
+            stats.blocks_drawn += (word & bit) == 0;
+            word |= bit;
+            continue;
+        }
+        missing_layer = std::min<uint32_t>(missing_layer, record.layer);
+        if (state != ChunkState::rejected) ++stats.chunks_late;
+    }
+    stats.layers_drawn = missing_layer;
+    if (stats.chunks_late) stats.cut |= player.residency.no_room ? cut_residency : cut_late;
+    if (!player.frame.target) stats.blocks_drawn = stats.layers_drawn = 0;
+}
+
+void count_residency(const Player& player, Stats& stats) {
+    const Residency& r = player.residency;
+    for (uint32_t i = 0; i < r.held_count; ++i)
+        stats.chunks_resident += r.chunks[r.held[i]].state == ChunkState::resident;
+    stats.chunks_rejected = r.chunks_rejected;
+    stats.reads_in_flight = r.slots_out;
+    stats.reads_refused = r.reads_refused;
+    stats.reads_failed = r.reads_failed;
+    stats.bytes_resident = r.heap.used;
+    stats.bytes_asked = r.bytes_asked;
+    stats.bytes_arrived = r.bytes_arrived;
+    stats.windows_decoded = r.windows_decoded;
+}
+
+void count_output(Player& player, Stats& stats) {
+    Target* target = player.frame.target;
+    if (!target) return;
+    const Evaluation& e = player.evaluation;
+    const MeshCounts mesh = mesh_counts(player.mesher);
+    stats.points_wanted = e.points_wanted;
+    stats.points_used = e.points.count + e.drops.count;
+    stats.vertices_wanted = mesh.vertices_wanted;
+    stats.indices_wanted = mesh.indices_wanted;
+    stats.cut |= mesh.cut | (e.cut ? uint32_t(cut_points) : 0u);
+    const bool points = target->point_position.data || target->point_normal.data;
+    target->points_used = points ? std::min(e.points.count, target->point_capacity) : 0;
+}
+
+/// Too slow: one level coarser from the next frame on. Twice as fast as needed: one finer (a level
+/// costs about four times the work, hence the wide gap).
+void count_time(Player& player, Stats& stats) {
+    const uint32_t cap = player.frame.budget.microseconds;
+    if (!cap) {
+        player.coarser = 0;
+        return;
+    }
+    stats.plan_us = player.plan_us;
+    stats.wait_us = player.wait_us;
+    stats.decode_us = uint32_t(player.decode_done.us - player.decode_begun.us);
+    if (player.frame.target) {
+        stats.field_us = uint32_t(player.mesh_begun.us - player.decode_done.us);
+        stats.mesh_us = uint32_t(player.mesh_done.us - player.mesh_begun.us);
+    }
+    if (player.coarser) stats.cut |= cut_time;
+    constexpr uint32_t most_coarser = 4;
+    const uint64_t spent = player.plan_us + (player.mesh_done.us - player.decode_begun.us);
+    if (spent > cap && player.coarser < most_coarser) ++player.coarser;
+    else if (spent * 6 < cap && player.coarser) --player.coarser;
+}
+
+}  // namespace
+
+Stats count_all(Player& player) noexcept {
+    Stats stats{};
+    stats.blocks_in_view = player.plan.blocks_in_view;
+    stats.layers_wanted = player.plan.detail.layers;
+    stats.cell_size = player.plan.detail.cell_size;
+    stats.pixel_error = player.plan.detail.pixel_error;
+    count_drawn(player, stats);
+    count_residency(player, stats);
+    count_output(player, stats);
+    count_time(player, stats);
+    return stats;
+}
+
+}  // namespace rill
