@@ -41,5 +41,6 @@ Mesh read_obj(const std::filesystem::path& path, const ReadOptions& options);
 
 /// Readers with a directory layout of their own; null when `directory` is not theirs.
 std::unique_ptr<SequenceReader> open_mantaflow(const std::filesystem::path& directory, const ReadOptions& options);
+std::unique_ptr<SequenceReader> open_flip_fluids(const std::filesystem::path& directory, const ReadOptions& options);
 
 }  // namespace rill::cooker

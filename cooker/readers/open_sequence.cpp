@@ -10,13 +10,14 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string what_is_read() {
-    std::string text = "Rill reads Mantaflow cache directories";
+    std::string text = "Rill reads Mantaflow and FLIP Fluids cache directories";
     for (const FrameFormat& format : frame_formats()) text += ", " + format.extension + " files";
     return text;
 }
 
 std::unique_ptr<SequenceReader> open_directory(const fs::path& directory, const ReadOptions& options) {
     if (auto reader = open_mantaflow(directory, options)) return reader;
+    if (auto reader = open_flip_fluids(directory, options)) return reader;
     std::unique_ptr<SequenceReader> found;
     std::string found_extension;
     for (const FrameFormat& format : frame_formats()) {

@@ -27,6 +27,10 @@ size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
 /// Cells of the dense grid: enough that a cell holds a few points of a surface.
 uint32_t grid_capacity(uint32_t points) { return 8 * points + 64; }
 
+/// Clusters are blocks of so many grid cells a side; a block of many points makes several.
+constexpr uint32_t cluster_cells = 4, cluster_size = 32;
+uint32_t cluster_capacity(uint32_t points) { return points; }
+
 struct Carver {
     uint8_t* at;
     template <class T> T* take(size_t count) {
@@ -47,6 +51,8 @@ void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
     for (float** array : drop_arrays) *array = carver.take<float>(drops);
     for (float*& array : field.inverse) array = carver.take<float>(drops);
     field.cell_start = carver.take<uint32_t>(grid_capacity(points) + 1);
+    field.clusters = carver.take<Cluster>(cluster_capacity(points));
+    field.cluster_member = carver.take<uint32_t>(points);
 }
 
 bool finite(const format::PointSet& p, uint32_t i) {
@@ -267,11 +273,56 @@ void fit_patch(Field& f, uint32_t i) {
     f.qyz[i] = a * s[1] * s[2] + b * (s[1] * t[2] + s[2] * t[1]) + c * t[1] * t[2];
 }
 
+void close_cluster(Field& f, Cluster& k) {
+    float total = 0, furthest = 0;
+    for (uint32_t m = k.first; m < k.last; ++m) {
+        const uint32_t j = f.cluster_member[m];
+        const float area = disc_area(f, j), p[3] = {f.x[j], f.y[j], f.z[j]}, n[3] = {f.nx[j], f.ny[j], f.nz[j]};
+        for (int a = 0; a < 3; ++a) k.centre[a] += area * p[a], k.area[a] += area * n[a];
+        total += area;
+    }
+    for (float& x : k.centre) x /= std::max(total, 1e-30f);
+    for (uint32_t m = k.first; m < k.last; ++m) {
+        const uint32_t j = f.cluster_member[m];
+        const float d[3] = {f.x[j] - k.centre[0], f.y[j] - k.centre[1], f.z[j] - k.centre[2]};
+        furthest = std::max(furthest, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    }
+    k.radius = std::sqrt(furthest);
+}
+
+/// Points of the grid cells of one block, row by row.
+uint32_t list_block(Field& f, const uint32_t block[3], uint32_t at) {
+    const uint32_t* size = f.grid_size;
+    for (uint32_t z = block[2]; z < std::min(block[2] + cluster_cells, size[2]); ++z)
+        for (uint32_t y = block[1]; y < std::min(block[1] + cluster_cells, size[1]); ++y) {
+            const uint32_t row = (z * size[1] + y) * size[0];
+            const uint32_t last = std::min(block[0] + cluster_cells, size[0]);
+            for (uint32_t j = f.cell_start[row + block[0]]; j < f.cell_start[row + last]; ++j) f.cluster_member[at++] = j;
+        }
+    return at;
+}
+
+void build_clusters(Field& f) {
+    uint32_t listed = 0, block[3];
+    for (block[2] = 0; block[2] < f.grid_size[2]; block[2] += cluster_cells)
+        for (block[1] = 0; block[1] < f.grid_size[1]; block[1] += cluster_cells)
+            for (block[0] = 0; block[0] < f.grid_size[0]; block[0] += cluster_cells) {
+                const uint32_t end = list_block(f, block, listed);
+                for (; listed < end; listed = std::min(listed + cluster_size, end)) {
+                    Cluster& k = f.clusters[f.cluster_count++];
+                    k = {};
+                    k.first = listed, k.last = std::min(listed + cluster_size, end);
+                    close_cluster(f, k);
+                }
+            }
+}
+
 }  // namespace
 
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
-    return 17 * aligned(points * sizeof(float)) + aligned(points * sizeof(uint32_t)) +
-           15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t));
+    return 17 * aligned(points * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
+           15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t)) +
+           aligned(cluster_capacity(points) * sizeof(Cluster));
 }
 
 void begin_field(Field& field, void* memory, const format::PointSet& points,
@@ -288,6 +339,7 @@ void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
 }
 
 void finish_field(Field& f) noexcept {
+    build_clusters(f);
     for (int a = 0; a < 3; ++a) f.lower[a] = 1e30f, f.upper[a] = -1e30f;
     const auto include = [&](float x, float y, float z, float r) {
         const float p[3] = {x, y, z};

@@ -23,6 +23,13 @@ struct Box {
     float lower[3], upper[3];
 };
 
+/// Points of one region as a single oriented disc, for the winding number.
+struct Cluster {
+    float centre[3], area[3];  ///< area: Σ area · normal / 4π
+    float radius;              ///< of a ball round the centre that holds them
+    uint32_t first, last;      ///< into Field::cluster_member
+};
+
 /// All memory is the caller's: one block of field_bytes(), 64-byte aligned.
 struct Field {
     // Points sorted by grid cell (ties by input index), and their local quadratics.
@@ -40,6 +47,9 @@ struct Field {
     uint32_t* cell_start;
     uint32_t grid_size[3];
     float grid_origin[3], grid_cell;
+    Cluster* clusters;
+    uint32_t* cluster_member;              ///< sorted points, cluster by cluster
+    uint32_t cluster_count;
     float largest_support, largest_reach;  ///< over points; over drops
     float lower[3], upper[3];              ///< of everything with weight
 };
@@ -55,6 +65,11 @@ void begin_field(Field& field, void* memory, const format::PointSet& points,
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
 /// Step 3, one thread: largest support, bounds.
 void finish_field(Field& field) noexcept;
+
+/// Area over 4π of the disc that point j stands for: from the distance to its 6th neighbour.
+inline float disc_area(const Field& field, uint32_t j) {
+    return 0.0197f * field.support[j] * field.support[j] * field.activity[j];
+}
 
 /// Patches and drops whose weight can be non-zero somewhere in the box, ascending; drops are numbered
 /// from field.point_count on. Returns how many there are; writes at most `capacity` of them (when the

@@ -29,6 +29,7 @@ constexpr float flatten = 3;
 constexpr float core = 0.3f;            // of u²: the nearest point is this near, or the winding number decides
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
 constexpr float agreeing = 0.7f;        // above this: full weight in A; between, patches of another face fade out
+constexpr float steep = 0.4f;           // of (n·r)² / |r|²
 constexpr float gate_scale = 1 / (agreeing - opposed);
 constexpr float opposed_reach = 0.51f;  // (1/1.4)²: cluster B has weight only within R/1.4
 constexpr float soften = 1e-4f;         // of u² in the weight (1 − u)² / u²
@@ -39,33 +40,46 @@ struct Positions {
 /// The point nearest to each position among those whose support holds it.
 struct Nearest {
     float key[lanes];  // squared distance / activity; a point that fades recedes
-    float u2[lanes];   // of that point
+    float u2[lanes], d2[lanes], h[lanes];  // of that point; squared distance and height over its plane
     bool far(uint32_t l) const { return u2[l] > core; }
+    /// Straight over or under that point: its plane gives the sign, however far.
+    bool above(uint32_t l) const { return key[l] < unsupported && h[l] * h[l] > steep * d2[l]; }
     float x[lanes], y[lanes], z[lanes], nx[lanes], ny[lanes], nz[lanes];
 };
-struct Cluster {
-    float weight[lanes], sum[lanes];
+/// Sums of the two clusters, and on which side of A the points of B lie.
+struct Blend {
+    float weight_a[lanes], sum_a[lanes], weight_b[lanes], sum_b[lanes], side[lanes];
+};
+/// Sums of the chosen cluster with their gradients.
+struct Gradients {
+    float weight[lanes];
     float gx[lanes], gy[lanes], gz[lanes];     // Σ w ∇G + G ∇w
     float wx[lanes], wy[lanes], wz[lanes];     // Σ ∇w
     float vx[lanes], vy[lanes], vz[lanes];     // Σ w v
 };
 
+inline float gate_of(float agree) {
+    const float gate = (agree - opposed) * gate_scale;
+    return gate < 0 ? 0.f : gate < 1 ? gate : 1.f;
+}
+
 RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32_t count, const Positions& p,
                               Nearest& n) {
     for (uint32_t l = 0; l < lanes; ++l) {
-        n.key[l] = n.u2[l] = unsupported;
+        n.key[l] = n.u2[l] = n.d2[l] = unsupported, n.h[l] = 0;
         n.x[l] = n.y[l] = n.z[l] = n.nx[l] = n.ny[l] = n.nz[l] = 0;
     }
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = candidates[c];
         const float xj = f.x[j], yj = f.y[j], zj = f.z[j], nx = f.nx[j], ny = f.ny[j], nz = f.nz[j];
-        const float reach = f.support[j] * f.support[j], recede = 1 / f.activity[j];
+        const float reach = f.support[j] * f.support[j], recede = 1 / f.activity[j], inverse = 1 / reach;
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
             const float d2 = rx * rx + ry * ry + rz * rz, h = nx * rx + ny * ry + nz * rz;
             const float key = d2 < reach ? d2 * recede : unsupported;
             const bool nearer = key < n.key[l];
-            n.u2[l] = nearer ? (d2 + flatten * h * h) / reach : n.u2[l];
+            n.u2[l] = nearer ? (d2 + flatten * h * h) * inverse : n.u2[l];
+            n.d2[l] = nearer ? d2 : n.d2[l], n.h[l] = nearer ? h : n.h[l];
             n.key[l] = nearer ? key : n.key[l];
             n.x[l] = nearer ? xj : n.x[l], n.y[l] = nearer ? yj : n.y[l], n.z[l] = nearer ? zj : n.z[l];
             n.nx[l] = nearer ? nx : n.nx[l], n.ny[l] = nearer ? ny : n.ny[l], n.nz[l] = nearer ? nz : n.nz[l];
@@ -73,9 +87,10 @@ RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32
     }
 }
 
+/// Sums are kept in arrays of the function's own: nothing the compiler must fear to be aliased.
 RILL_KERNEL void blend_values(const Field& f, const uint32_t* candidates, uint32_t count, const Positions& p,
-                              const Nearest& n, Cluster& a, Cluster& b, float* side) {
-    for (uint32_t l = 0; l < lanes; ++l) a.weight[l] = a.sum[l] = b.weight[l] = b.sum[l] = side[l] = 0;
+                              const Nearest& n, Blend& out) {
+    float weight_a[lanes] = {}, sum_a[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {}, side[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = candidates[c];
         const float xj = f.x[j], yj = f.y[j], zj = f.z[j], nx = f.nx[j], ny = f.ny[j], nz = f.nz[j];
@@ -85,24 +100,27 @@ RILL_KERNEL void blend_values(const Field& f, const uint32_t* candidates, uint32
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
             const float h = nx * rx + ny * ry + nz * rz;
             const float u2 = (rx * rx + ry * ry + rz * rz + flatten * h * h) * inverse;
-            const float u = std::sqrt(std::min(u2, 1.f)), v = 1 - u;
+            const float v = 1 - std::sqrt(u2 < 1 ? u2 : 1.f);
             const float w = activity * v * v / (u2 + soften);
-            const float g = h + rx * (xx * rx + xy * ry + xz * rz) +
-                            ry * (yy * ry + yz * rz) + zz * rz * rz;
+            const float g = h + rx * (xx * rx + xy * ry + xz * rz) + ry * (yy * ry + yz * rz) + zz * rz * rz;
             const float agree = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l];
-            const bool against = agree < opposed;
-            const float gate = std::min(std::max((agree - opposed) * gate_scale, 0.f), 1.f);
-            const float wa = w * gate * gate, wb = against && u2 < opposed_reach ? w : 0;
-            a.weight[l] += wa, a.sum[l] += wa * g;
-            b.weight[l] += wb, b.sum[l] += wb * g;
+            const float gate = gate_of(agree), wa = w * gate * gate;
+            const float wb = agree < opposed && u2 < opposed_reach ? w : 0.f;
+            weight_a[l] += wa, sum_a[l] += wa * g;
+            weight_b[l] += wb, sum_b[l] += wb * g;
             side[l] += wb * (n.nx[l] * (xj - n.x[l]) + n.ny[l] * (yj - n.y[l]) + n.nz[l] * (zj - n.z[l]));
         }
     }
+    for (uint32_t l = 0; l < lanes; ++l) {
+        out.weight_a[l] = weight_a[l], out.sum_a[l] = sum_a[l];
+        out.weight_b[l] = weight_b[l], out.sum_b[l] = sum_b[l], out.side[l] = side[l];
+    }
 }
 
-/// Gradients of one cluster: of the side of n0 (sign 1) or against it (−1).
+/// Gradients of the cluster that `sign` names for each lane: 1 for A, −1 for B, 0 for neither.
 RILL_KERNEL void blend_gradients(const Field& f, const uint32_t* candidates, uint32_t count, const Positions& p,
-                                 const Nearest& n, bool want_opposed, const uint8_t* chosen, Cluster& k) {
+                                 const Nearest& n, const float* sign, Gradients& out) {
+    Gradients k{};
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = candidates[c];
         const float xj = f.x[j], yj = f.y[j], zj = f.z[j], nx = f.nx[j], ny = f.ny[j], nz = f.nz[j];
@@ -113,52 +131,72 @@ RILL_KERNEL void blend_gradients(const Field& f, const uint32_t* candidates, uin
             const float rx = p.x[l] - xj, ry = p.y[l] - yj, rz = p.z[l] - zj;
             const float h = nx * rx + ny * ry + nz * rz, lean = flatten * h;
             const float u2 = (rx * rx + ry * ry + rz * rz + lean * h) * inverse;
-            const float u = std::sqrt(std::min(u2, 1.f)), v = 1 - u, s = 1 / (u2 + soften);
+            const float u = std::sqrt(u2 < 1 ? u2 : 1.f), v = 1 - u, s = 1 / (u2 + soften);
             const float agree = nx * n.nx[l] + ny * n.ny[l] + nz * n.nz[l];
-            const bool against = agree < opposed;
-            const float gate = std::min(std::max((agree - opposed) * gate_scale, 0.f), 1.f);
-            const bool mine = bool(chosen[l]) && against == want_opposed && (!against || u2 < opposed_reach);
-            const float keep = mine ? (against ? activity : activity * gate * gate) : 0;
+            const float gate = gate_of(agree), in_b = agree < opposed && u2 < opposed_reach ? 1.f : 0.f;
+            const float keep = activity * (sign[l] > 0 ? gate * gate : sign[l] < 0 ? in_b : 0.f);
             const float w = keep * v * v * s;
-            const float slope = -2 * keep * v * s * inverse * (1 / std::max(u, 1e-4f) + v * s);
+            const float slope = -2 * keep * v * s * inverse * (1 / (u > 1e-4f ? u : 1e-4f) + v * s);
             const float hx = xx * rx + xy * ry + xz * rz, hy = xy * rx + yy * ry + yz * rz,
                         hz = xz * rx + yz * ry + zz * rz;
             const float g = h + 0.5f * (rx * hx + ry * hy + rz * hz);
             const float dx = slope * (rx + lean * nx), dy = slope * (ry + lean * ny), dz = slope * (rz + lean * nz);
-            k.weight[l] += w, k.sum[l] += w * g;
+            k.weight[l] += w;
             k.gx[l] += w * (nx + hx) + g * dx, k.wx[l] += dx, k.vx[l] += w * vx;
             k.gy[l] += w * (ny + hy) + g * dy, k.wy[l] += dy, k.vy[l] += w * vy;
             k.gz[l] += w * (nz + hz) + g * dz, k.wz[l] += dz, k.vz[l] += w * vz;
         }
     }
+    out = k;
 }
 
-/// Winding number of the points as oriented discs at each position (Barill et al. 2018, equation 5): about 1 in
-/// the liquid, 0 in the air. Beyond all supports it gives a sign that holes and stray points cannot turn.
-RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* winding) {
-    for (uint32_t l = 0; l < lanes; ++l) winding[l] = 0;
-    for (uint32_t j = 0; j < f.point_count; ++j) {
-        const float xj = f.x[j], yj = f.y[j], zj = f.z[j];
-        // The area a point stands for, from the distance to its 6th neighbour; over 4 pi.
-        const float area = 0.0197f * f.support[j] * f.support[j] * f.activity[j];
-        const float nx = area * f.nx[j], ny = area * f.ny[j], nz = area * f.nz[j];
+/// Winding number of the points as oriented discs at each position (Barill et al. 2018): about 1 in the liquid, 0 in
+/// the air. Beyond all supports it gives a sign that holes and stray points cannot turn. Clusters seen from afar
+/// count as one disc.
+RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* out) {
+    float winding[lanes] = {}, lower[3] = {p.x[0], p.y[0], p.z[0]}, upper[3] = {p.x[0], p.y[0], p.z[0]};
+    const float* const rows[3] = {p.x, p.y, p.z};
+    for (int a = 0; a < 3; ++a)
+        for (uint32_t l = 0; l < lanes; ++l)
+            lower[a] = std::min(lower[a], rows[a][l]), upper[a] = std::max(upper[a], rows[a][l]);
+    const auto add = [&](float xj, float yj, float zj, float nx, float ny, float nz) __attribute__((always_inline)) {
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = xj - p.x[l], ry = yj - p.y[l], rz = zj - p.z[l];
             const float d2 = rx * rx + ry * ry + rz * rz + 1e-20f;
             winding[l] += (nx * rx + ny * ry + nz * rz) / (d2 * std::sqrt(d2));
         }
+    };
+    for (uint32_t c = 0; c < f.cluster_count; ++c) {
+        const Cluster& k = f.clusters[c];
+        float distance2 = 0;
+        for (int a = 0; a < 3; ++a) {
+            const float d = std::max({lower[a] - k.centre[a], k.centre[a] - upper[a], 0.f});
+            distance2 += d * d;
+        }
+        if (distance2 > 4 * k.radius * k.radius) {
+            add(k.centre[0], k.centre[1], k.centre[2], k.area[0], k.area[1], k.area[2]);
+            continue;
+        }
+        for (uint32_t m = k.first; m < k.last; ++m) {
+            const uint32_t j = f.cluster_member[m];
+            const float area = disc_area(f, j);
+            add(f.x[j], f.y[j], f.z[j], area * f.nx[j], area * f.ny[j], area * f.nz[j]);
+        }
     }
+    for (uint32_t l = 0; l < lanes; ++l) out[l] = winding[l];
 }
 
 /// Signs for the first n positions where no patch has weight.
 void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& nearest, float* value) {
     bool any = false;
-    for (uint32_t l = 0; l < n; ++l) any |= nearest.far(l);
-    if (!any) return;
-    float winding[lanes];
-    if (f.point_count) winding_numbers(f, p, winding);
+    for (uint32_t l = 0; l < n; ++l) any |= nearest.far(l) && !nearest.above(l);
+    float winding[lanes] = {};
+    if (any && f.point_count) winding_numbers(f, p, winding);
     for (uint32_t l = 0; l < n; ++l)
-        if (nearest.far(l)) value[l] = f.point_count && winding[l] > 0.5f ? -f.grid_cell : unsupported;
+        if (nearest.far(l))
+            value[l] = nearest.above(l)                          ? nearest.h[l]
+                       : f.point_count && winding[l] > 0.5f ? -f.grid_cell
+                                                            : unsupported;
 }
 
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t first, uint32_t count, const float* x,
@@ -194,26 +232,24 @@ void load(Positions& p, const float* x, const float* y, const float* z, uint32_t
     }
 }
 
-struct Blend {
+/// Values of up to `lanes` positions, and which cluster gave each.
+struct Batch {
     Positions p;
     Nearest nearest;
-    Cluster a, b;
-    float side[lanes], value[lanes];
-    uint8_t use_b[lanes];
+    float value[lanes], sign[lanes];  // 1: cluster A, −1: B, 0: far
 };
 void blend(const Field& f, const uint32_t* candidates, uint32_t points, const float* x, const float* y,
-           const float* z, uint32_t n, Blend& k) {
+           const float* z, uint32_t n, Batch& k) {
     load(k.p, x, y, z, n);
     find_nearest(f, candidates, points, k.p, k.nearest);
-    blend_values(f, candidates, points, k.p, k.nearest, k.a, k.b, k.side);
-    for (uint32_t l = 0; l < n; ++l) {
-        k.use_b[l] = 0;
-        if (k.nearest.far(l)) continue;
-        k.value[l] = k.a.sum[l] / k.a.weight[l];
-        if (!(k.b.weight[l] > 0)) continue;
-        const float other = k.b.sum[l] / k.b.weight[l];
-        k.use_b[l] = k.side[l] < 0 ? other > k.value[l] : other < k.value[l];
-        if (k.use_b[l]) k.value[l] = other;
+    Blend sums;
+    blend_values(f, candidates, points, k.p, k.nearest, sums);
+    for (uint32_t l = 0; l < lanes; ++l) {
+        k.sign[l] = k.nearest.far(l) ? 0.f : 1.f;
+        k.value[l] = sums.sum_a[l] / sums.weight_a[l];
+        if (k.nearest.far(l) || !(sums.weight_b[l] > 0)) continue;
+        const float other = sums.sum_b[l] / sums.weight_b[l];
+        if (sums.side[l] < 0 ? other > k.value[l] : other < k.value[l]) k.value[l] = other, k.sign[l] = -1;
     }
     decide_far(f, k.p, n, k.nearest, k.value);
 }
@@ -262,7 +298,7 @@ uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity
 void evaluate(const Field& f, const uint32_t* candidates, uint32_t candidate_count, const float* x, const float* y,
               const float* z, uint32_t n, float* value) noexcept {
     const uint32_t points = count_points(f, candidates, candidate_count);
-    Blend k;
+    Batch k;
     for (uint32_t first = 0; first < n; first += lanes) {
         const uint32_t some = std::min(lanes, n - first);
         blend(f, candidates, points, x + first, y + first, z + first, some, k);
@@ -277,25 +313,18 @@ void evaluate_gradient(const Field& f, const uint32_t* candidates, uint32_t cand
                        float* velocity) noexcept {
     const uint32_t points = count_points(f, candidates, candidate_count);
     float *vx = velocity, *vy = velocity ? velocity + n : nullptr, *vz = velocity ? velocity + 2 * n : nullptr;
-    Blend k;
+    Batch k;
     for (uint32_t first = 0; first < n; first += lanes) {
         const uint32_t some = std::min(lanes, n - first);
         blend(f, candidates, points, x + first, y + first, z + first, some, k);
-        uint8_t chosen[2][lanes];
-        bool any_b = false;
-        for (uint32_t l = 0; l < lanes; ++l) {
-            const bool in_b = l < some && k.use_b[l];
-            chosen[0][l] = !in_b, chosen[1][l] = in_b;
-            any_b |= in_b;
-        }
-        Cluster sum{};
-        blend_gradients(f, candidates, points, k.p, k.nearest, false, chosen[0], sum);
-        if (any_b) blend_gradients(f, candidates, points, k.p, k.nearest, true, chosen[1], sum);
+        Gradients sum;
+        blend_gradients(f, candidates, points, k.p, k.nearest, k.sign, sum);
         for (uint32_t l = 0; l < some; ++l) {
             const uint32_t i = first + l;
             value[i] = k.value[l];
             if (k.nearest.far(l) || !(sum.weight[l] > 0)) {
-                gx[i] = gy[i] = gz[i] = 0;
+                const float known = k.nearest.above(l) ? 1.f : 0.f;
+                gx[i] = known * k.nearest.nx[l], gy[i] = known * k.nearest.ny[l], gz[i] = known * k.nearest.nz[l];
                 if (vx) vx[i] = vy[i] = vz[i] = 0;
                 continue;
             }
