@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "draco_mesh.h"
+#include "reader_faults.h"
 #include "readers/reader.h"
 #include "sequence_files.h"
 #include "shapes.h"
@@ -15,25 +16,6 @@ using namespace rill::cooker;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// Opens and reads every frame; the text of the InputError, or "" when all is well.
-std::string fault(const std::string& input, const ReadOptions& options = {}) {
-    try {
-        const auto reader = open_sequence(input, options);
-        for (size_t i = 0; i < reader->info().numbers.size(); ++i) reader->read(i);
-        return "";
-    } catch (const InputError& error) {
-        const std::string text = error.what();
-        CHECK(text.find('\n') == std::string::npos);
-        return text;
-    }
-}
-#define CHECK_FAULT(expression, ...)                                  \
-    do {                                                              \
-        const std::string text = expression;                          \
-        CAPTURE(text);                                                \
-        for (const std::string& part : std::vector<std::string>{__VA_ARGS__}) CHECK_MESSAGE(text.find(part) != std::string::npos, part); \
-    } while (false)
 
 Mesh moving_ball(int frame) {
     Mesh mesh = bumpy_sphere(12, 0.5f, {0.1f * float(frame), 0, 0});

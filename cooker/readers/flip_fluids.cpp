@@ -69,7 +69,8 @@ std::map<int, double> first_substeps(const fs::path& cache) {
     std::map<int, double> parts;
     if (const fs::path stats = cache / "flipstats.data"; fs::exists(stats)) {
         // Not the lengths, only how many: equal ones are the best guess.
-        for (const auto& [key, frame] : read_json(stats).items())
+        const json frames = read_json(stats);
+        for (const auto& [key, frame] : frames.items())
             if (frame.is_object() && frame.contains("substeps"))
                 parts[std::atoi(key.c_str())] = 1 / std::max(1.0, positive(frame, "/substeps", stats, 1));
     }
