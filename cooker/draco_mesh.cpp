@@ -15,11 +15,29 @@ int add_vectors(draco::Mesh& mesh, const std::vector<glm::vec3>& values, draco::
     return id;
 }
 
-std::vector<glm::vec3> get_vectors(const draco::Mesh& mesh, const draco::PointAttribute& attribute) {
+std::vector<glm::vec3> get_vectors(const draco::Mesh& mesh, const draco::PointAttribute& attribute, const std::string& name) {
     std::vector<glm::vec3> values(mesh.num_points());
-    for (uint32_t i = 0; i < values.size(); ++i)
-        attribute.ConvertValue<float, 3>(attribute.mapped_index(draco::PointIndex(i)), &values[i].x);
+    for (uint32_t i = 0; i < values.size(); ++i) {
+        const draco::AttributeValueIndex at = attribute.mapped_index(draco::PointIndex(i));
+        if (at.value() >= attribute.size()) throw InputError(name + ": damaged Draco mesh: point " + std::to_string(i) + " has no value");
+        attribute.ConvertValue<float, 3>(at, &values[i].x);
+    }
     return values;
+}
+
+std::unique_ptr<draco::Mesh> decode_any(const std::string& bytes, const std::string& name) {
+    try {
+        draco::DecoderBuffer buffer;
+        buffer.Init(bytes.data(), bytes.size());
+        draco::Decoder decoder;
+        auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+        if (!decoded.ok()) throw InputError(name + ": not a Draco mesh: " + decoded.status().error_msg());
+        return std::move(decoded).value();
+    } catch (const std::bad_alloc&) {  // Draco believes the counts that a damaged file states
+        throw InputError(name + ": damaged Draco mesh: states more than fits in memory");
+    } catch (const std::length_error&) {
+        throw InputError(name + ": damaged Draco mesh: states more than fits in memory");
+    }
 }
 
 }  // namespace
@@ -46,21 +64,20 @@ std::string draco_encode(const Mesh& mesh, int bits) {
     return std::string(buffer.data(), buffer.size());
 }
 
-Mesh draco_decode(const std::string& bytes, const std::string& name) {
+Mesh draco_decode(const std::string& bytes, const std::string& name, const DracoIds& ids) {
     Mesh mesh;
     if (bytes.empty()) return mesh;
-    draco::DecoderBuffer buffer;
-    buffer.Init(bytes.data(), bytes.size());
-    draco::Decoder decoder;
-    auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-    if (!decoded.ok()) throw InputError(name + ": not a Draco mesh: " + decoded.status().error_msg());
-    const std::unique_ptr<draco::Mesh> source = std::move(decoded).value();
-    const draco::PointAttribute* position = source->GetNamedAttribute(draco::GeometryAttribute::POSITION);
-    if (!position || position->num_components() != 3) throw InputError(name + ": no positions of three components");
-    mesh.positions = get_vectors(*source, *position);
-    const draco::PointAttribute* generic = source->GetNamedAttribute(draco::GeometryAttribute::GENERIC);
-    if (generic && generic->num_components() == 3 && generic->data_type() == draco::DT_FLOAT32)
-        mesh.velocities = get_vectors(*source, *generic);
+    const std::unique_ptr<draco::Mesh> source = decode_any(bytes, name);
+    const auto find = [&](int id, draco::GeometryAttribute::Type type) {
+        if (id >= 0) return source->GetAttributeByUniqueId(uint32_t(id));
+        return ids.position >= 0 ? nullptr : source->GetNamedAttribute(type);
+    };
+    const draco::PointAttribute* position = find(ids.position, draco::GeometryAttribute::POSITION);
+    if (!position || position->num_components() != 3) throw InputError(name + ": no positions of three components in its Draco mesh");
+    mesh.positions = get_vectors(*source, *position, name);
+    const draco::PointAttribute* velocity = find(ids.velocity, draco::GeometryAttribute::GENERIC);
+    if (velocity && velocity->num_components() == 3 && velocity->data_type() == draco::DT_FLOAT32)
+        mesh.velocities = get_vectors(*source, *velocity, name);
     mesh.triangles.resize(source->num_faces());
     for (uint32_t i = 0; i < mesh.triangles.size(); ++i)
         for (int k = 0; k < 3; ++k) mesh.triangles[i][k] = source->face(draco::FaceIndex(i))[k].value();

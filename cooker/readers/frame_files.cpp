@@ -148,6 +148,8 @@ const std::vector<FrameFormat>& frame_formats() {
         {".ply", "PLY sequence", read_ply},
         {".obj", "OBJ sequence", read_obj},
         {".drc", "Draco sequence", read_drc},
+        {".glb", "glTF sequence", read_gltf},
+        {".gltf", "glTF sequence", read_gltf},
     };
     return formats;
 }

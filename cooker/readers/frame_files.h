@@ -38,6 +38,7 @@ std::unique_ptr<SequenceReader> open_frame_files(const FrameFormat& format, std:
 
 Mesh read_ply(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_obj(const std::filesystem::path& path, const ReadOptions& options);
+Mesh read_gltf(const std::filesystem::path& path, const ReadOptions& options);
 
 /// Readers with a directory layout of their own; null when `directory` is not theirs.
 std::unique_ptr<SequenceReader> open_mantaflow(const std::filesystem::path& directory, const ReadOptions& options);

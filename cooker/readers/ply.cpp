@@ -95,18 +95,14 @@ bool find_triple(const PlyElement& vertex, const std::array<std::string, 3>& nam
 
 /// Names that exporters give velocity, or the spellings of the one asked for.
 bool find_velocity(const PlyElement& vertex, const std::string& asked, int (&place)[3]) {
-    if (!asked.empty()) {
-        static constexpr const char* endings[][3] = {
-            {"_x", "_y", "_z"}, {"x", "y", "z"}, {".x", ".y", ".z"}, {"_0", "_1", "_2"}, {"[0]", "[1]", "[2]"}};
+    static constexpr const char* endings[][3] = {
+        {"_x", "_y", "_z"}, {"x", "y", "z"}, {".x", ".y", ".z"}, {"_0", "_1", "_2"}, {"[0]", "[1]", "[2]"}};
+    std::vector<std::string> names = {asked};
+    if (asked.empty()) names = {"v", "velocity", "vel", "Velocity", "flip_velocity"};
+    for (const std::string& name : names)
         for (const auto& ends : endings)
-            if (find_triple(vertex, {asked + ends[0], asked + ends[1], asked + ends[2]}, place)) return true;
-        return false;
-    }
-    static const std::array<std::string, 3> known[] = {
-        {"vx", "vy", "vz"}, {"velocity_x", "velocity_y", "velocity_z"}, {"vel_x", "vel_y", "vel_z"},
-        {"velx", "vely", "velz"}, {"velocity_0", "velocity_1", "velocity_2"}, {"v_x", "v_y", "v_z"}, {"u", "v", "w"},
-    };
-    return std::any_of(std::begin(known), std::end(known), [&](const auto& names) { return find_triple(vertex, names, place); });
+            if (find_triple(vertex, {name + ends[0], name + ends[1], name + ends[2]}, place)) return true;
+    return asked.empty() && find_triple(vertex, {"u", "v", "w"}, place);
 }
 
 void read_vertices(Mesh& mesh, const PlyElement& element, Values& values, const std::string& asked) {
