@@ -73,7 +73,9 @@ float room_for(const SurfaceFrame& frame, const VertexTree& tree, const std::vec
 
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual,
                                         const std::vector<SurfacePoint>& points, float threshold) {
-    const auto badness = [&](uint32_t v) { return std::min(std::fabs(residual.distance[v]), 4 * frame.edge); };
+    const auto badness = [&](uint32_t v) {
+        return residual.wrong_side[v] ? 4 * frame.edge : std::min(std::fabs(residual.distance[v]), 4 * frame.edge);
+    };
     std::vector<uint32_t> bad;
     for (uint32_t v = 0; v < residual.distance.size(); ++v)
         if (badness(v) > threshold && frame.area[v] > 0) bad.push_back(v);

@@ -8,10 +8,12 @@
 #include <thread>
 #include <vector>
 
+#include "interrupt.h"
+
 namespace rill::cooker {
 
 /// Calls work(index) for every index < count on up to `jobs` threads (0: all cores). The first exception is
-/// rethrown here after all threads have ended.
+/// rethrown here after all threads have ended. Throws Interrupted when the user asked to stop.
 template <class Work>
 void parallel_for(size_t count, int jobs, const Work& work) {
     size_t threads = jobs > 0 ? size_t(jobs) : std::max(1u, std::thread::hardware_concurrency());
@@ -22,6 +24,7 @@ void parallel_for(size_t count, int jobs, const Work& work) {
     const auto run = [&] {
         for (size_t i; (i = next.fetch_add(1)) < count;) {
             try {
+                stop_if_interrupted();
                 work(i);
             } catch (...) {
                 const std::lock_guard lock(failure_mutex);

@@ -50,6 +50,7 @@ struct Window {
 struct Residual {
     std::vector<float> distance;         ///< signed, metres, per source vertex: positive where the source lies outside
                                          ///< the decoded surface; ±missing where nothing is decoded there
+    std::vector<uint8_t> wrong_side;     ///< per source vertex: a probe on its normal decodes to the wrong side
     std::vector<float> support;          ///< per input point: radius of its patch
 };
 inline constexpr float missing = 1e3f;

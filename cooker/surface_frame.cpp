@@ -7,6 +7,8 @@
 #include <nanoflann.hpp>
 #include <numeric>
 
+#include "surface_distance.h"
+
 namespace rill::cooker {
 namespace {
 
@@ -52,6 +54,25 @@ void group_vertices(SurfaceFrame& frame, float size) {
     }
 }
 
+/// On every third vertex's normal, near and farther, wherever no other surface comes close.
+void place_probes(SurfaceFrame& frame) {
+    const SurfaceIndex index(frame.mesh);
+    for (const VertexGroup& group : frame.groups) {
+        frame.first_probe.push_back(uint32_t(frame.probes.size()));
+        for (uint32_t i = group.first; i < group.first + group.count; i += 3) {
+            const uint32_t v = frame.order[i];
+            for (const float edges : {-1.5f, 1.5f, 4.f}) {
+                const float away = edges * frame.edge;
+                const glm::vec3 x = frame.mesh.positions[v] + away * frame.mesh.normals[v];
+                const float clear = 0.7f * std::fabs(away);
+                if (index.closest(x, clear).distance < clear) continue;
+                frame.probes.push_back({x, v, away > 0});
+            }
+        }
+    }
+    frame.first_probe.push_back(uint32_t(frame.probes.size()));
+}
+
 }  // namespace
 
 struct VertexTree::Impl {
@@ -89,6 +110,7 @@ SurfaceFrame::SurfaceFrame(Mesh source, float edge_length)
     : mesh(std::move(source)), area(vertex_areas(mesh)), tree(mesh.positions), edge(edge_length) {
     if (mesh.normals.empty()) mesh.normals = vertex_normals(mesh);
     group_vertices(*this, 6 * edge);
+    place_probes(*this);
 }
 
 bool settle(const SurfaceFrame& frame, float radius, SurfacePoint& point) {

@@ -31,6 +31,13 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
+/// Places beside the surface whose side is known: where the decoded surface must not be.
+struct Probe {
+    glm::vec3 position;
+    uint32_t vertex;   ///< whose normal it stands on
+    bool outside;
+};
+
 /// Vertices in spatially coherent groups, for batched field evaluation.
 struct VertexGroup {
     uint32_t first, count;  ///< into SurfaceFrame::order
@@ -43,6 +50,8 @@ struct SurfaceFrame {
     std::vector<float> area;        ///< per vertex, m²
     std::vector<uint32_t> order;    ///< vertices, grouped
     std::vector<VertexGroup> groups;
+    std::vector<Probe> probes;      ///< in the order of `groups`
+    std::vector<uint32_t> first_probe;  ///< per group, and the end
     VertexTree tree;
     float edge;                     ///< median edge of the sequence, metres
 };

@@ -44,6 +44,29 @@ private:
     std::vector<uint8_t> memory_;
 };
 
+/// Marks the vertices of a group whose probes are told to be on the wrong side.
+void ask_probes(const SurfaceFrame& frame, const surface::Field& field, uint32_t group, Residual& result) {
+    const uint32_t first = frame.first_probe[group], count = frame.first_probe[group + 1] - first;
+    if (count == 0) return;
+    thread_local std::vector<uint32_t> candidates;
+    thread_local std::vector<float> x, y, z, value;
+    candidates.resize(field.point_count);
+    for (auto* row : {&x, &y, &z, &value}) row->resize(count);
+    glm::vec3 lower(1e30f), upper(-1e30f);
+    for (uint32_t i = 0; i < count; ++i) {
+        const glm::vec3& p = frame.probes[first + i].position;
+        x[i] = p.x, y[i] = p.y, z[i] = p.z;
+        lower = glm::min(lower, p), upper = glm::max(upper, p);
+    }
+    const surface::Box box{{lower.x, lower.y, lower.z}, {upper.x, upper.y, upper.z}};
+    const uint32_t found = surface::gather(field, box, candidates.data(), uint32_t(candidates.size()));
+    surface::evaluate(field, candidates.data(), found, x.data(), y.data(), z.data(), count, value.data());
+    for (uint32_t i = 0; i < count; ++i) {
+        const Probe& probe = frame.probes[first + i];
+        if (probe.outside != (value[i] > 0)) result.wrong_side[probe.vertex] = 1;
+    }
+}
+
 struct TangentFrame {
     glm::vec3 t1, t2;
 };
@@ -66,6 +89,7 @@ SurfacePoint Path::target(int sample) const {
 Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, int jobs) {
     Residual result;
     result.distance.assign(frame.mesh.positions.size(), missing);
+    result.wrong_side.assign(frame.mesh.positions.size(), 0);
     result.support.assign(points.size(), 0.f);
     if (points.empty()) return result;
     const PointField decoded(points, jobs);
@@ -90,6 +114,7 @@ Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePo
             const float slope = std::sqrt(gx[i] * gx[i] + gy[i] * gy[i] + gz[i] * gz[i]);
             result.distance[frame.order[group.first + i]] = value[i] / std::max(slope, 0.3f);
         }
+        ask_probes(frame, field, uint32_t(g), result);
     });
     return result;
 }

@@ -43,7 +43,7 @@ struct Carver {
 void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
     float** arrays[] = {&field.x,   &field.y,   &field.z,   &field.nx,      &field.ny,      &field.nz,
                         &field.qxx, &field.qyy, &field.qzz, &field.qxy,     &field.qxz,     &field.qyz,
-                        &field.vx,  &field.vy,  &field.vz,  &field.support, &field.activity};
+                        &field.vx,  &field.vy,  &field.vz,  &field.support, &field.activity, &field.area};
     for (float** array : arrays) *array = carver.take<float>(points);
     field.source = carver.take<uint32_t>(points);
     float** drop_arrays[] = {&field.dx, &field.dy, &field.dz, &field.dvx, &field.dvy, &field.dvz,
@@ -235,11 +235,15 @@ void fit_patch(Field& f, uint32_t i) {
     // A lone point of its side must not reach across its whole surroundings.
     const float around = std::sqrt(neighbours.any[support_neighbour - 1]);
     const float spacing = std::min(spacing_of(f, neighbours), most_alone * around);
-    const float support = spacing > 0 ? support_scale * spacing : f.grid_cell;
+    const float support = spacing > 1e-4f * f.grid_cell ? support_scale * spacing : f.grid_cell;
     f.support[i] = support;
+    // k neighbours within d: on a surface one point in π d² / (k + ½). Far more even than a rule on the 6th.
+    const float last = neighbours.count >= support_neighbour ? neighbours.d2[neighbours.count - 1] / (float(neighbours.count) + 0.5f)
+                                                             : 0.15f * spacing * spacing;
+    f.area[i] = 0.25f * last * f.activity[i];
     float quadratic[3] = {0, 0, 0};
     const Frame3 frame = tangents(f.nx[i], f.ny[i], f.nz[i]);
-    if (neighbours.count >= 1 && spacing > 0) {
+    if (neighbours.count >= 1 && spacing > 1e-4f * f.grid_cell) {
         const float scale = 1 / spacing;
         const float reach = 1.15f * std::sqrt(neighbours.d2[neighbours.count - 1]) * scale;
         float m[6] = {}, rhs[3] = {};
@@ -277,7 +281,7 @@ void close_cluster(Field& f, Cluster& k) {
     float total = 0, furthest = 0;
     for (uint32_t m = k.first; m < k.last; ++m) {
         const uint32_t j = f.cluster_member[m];
-        const float area = disc_area(f, j), p[3] = {f.x[j], f.y[j], f.z[j]}, n[3] = {f.nx[j], f.ny[j], f.nz[j]};
+        const float area = f.area[j], p[3] = {f.x[j], f.y[j], f.z[j]}, n[3] = {f.nx[j], f.ny[j], f.nz[j]};
         for (int a = 0; a < 3; ++a) k.centre[a] += area * p[a], k.area[a] += area * n[a];
         total += area;
     }
@@ -320,7 +324,7 @@ void build_clusters(Field& f) {
 }  // namespace
 
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
-    return 17 * aligned(points * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
+    return 18 * aligned(points * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
            15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t)) +
            aligned(cluster_capacity(points) * sizeof(Cluster));
 }

@@ -39,6 +39,7 @@ struct Field {
     float *qxx, *qyy, *qzz, *qxy, *qxz, *qyz;  ///< Γ = d + n·r + rᵀQr, Q acts in the tangent plane
     float* support;                        ///< radius R_i beyond which the patch has no weight
     float* activity;
+    float* area;                           ///< that the point stands for, over 4π, for the winding number
     float *vx, *vy, *vz;
     uint32_t* source;                      ///< index in the PointSet each came from
     // Drops as they came, with inverse shape and mean radius.
@@ -65,11 +66,6 @@ void begin_field(Field& field, void* memory, const format::PointSet& points,
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
 /// Step 3, one thread: largest support, bounds.
 void finish_field(Field& field) noexcept;
-
-/// Area over 4π of the disc that point j stands for: from the distance to its 6th neighbour.
-inline float disc_area(const Field& field, uint32_t j) {
-    return 0.0197f * field.support[j] * field.support[j] * field.activity[j];
-}
 
 /// Patches and drops whose weight can be non-zero somewhere in the box, ascending; drops are numbered
 /// from field.point_count on. Returns how many there are; writes at most `capacity` of them (when the

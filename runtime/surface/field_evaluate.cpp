@@ -29,7 +29,6 @@ constexpr float flatten = 3;
 constexpr float core = 0.3f;            // of u²: the nearest point is this near, or the winding number decides
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
 constexpr float agreeing = 0.7f;        // above this: full weight in A; between, patches of another face fade out
-constexpr float steep = 0.4f;           // of (n·r)² / |r|²
 constexpr float gate_scale = 1 / (agreeing - opposed);
 constexpr float opposed_reach = 0.51f;  // (1/1.4)²: cluster B has weight only within R/1.4
 constexpr float soften = 1e-4f;         // of u² in the weight (1 − u)² / u²
@@ -40,10 +39,8 @@ struct Positions {
 /// The point nearest to each position among those whose support holds it.
 struct Nearest {
     float key[lanes];  // squared distance / activity; a point that fades recedes
-    float u2[lanes], d2[lanes], h[lanes];  // of that point; squared distance and height over its plane
+    float u2[lanes], h[lanes];  // of that point; h: height over its plane
     bool far(uint32_t l) const { return u2[l] > core; }
-    /// Straight over or under that point: its plane gives the sign, however far.
-    bool above(uint32_t l) const { return key[l] < unsupported && h[l] * h[l] > steep * d2[l]; }
     float x[lanes], y[lanes], z[lanes], nx[lanes], ny[lanes], nz[lanes];
 };
 /// Sums of the two clusters, and on which side of A the points of B lie.
@@ -66,7 +63,7 @@ inline float gate_of(float agree) {
 RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32_t count, const Positions& p,
                               Nearest& n) {
     for (uint32_t l = 0; l < lanes; ++l) {
-        n.key[l] = n.u2[l] = n.d2[l] = unsupported, n.h[l] = 0;
+        n.key[l] = n.u2[l] = n.h[l] = unsupported;
         n.x[l] = n.y[l] = n.z[l] = n.nx[l] = n.ny[l] = n.nz[l] = 0;
     }
     for (uint32_t c = 0; c < count; ++c) {
@@ -79,7 +76,7 @@ RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32
             const float key = d2 < reach ? d2 * recede : unsupported;
             const bool nearer = key < n.key[l];
             n.u2[l] = nearer ? (d2 + flatten * h * h) * inverse : n.u2[l];
-            n.d2[l] = nearer ? d2 : n.d2[l], n.h[l] = nearer ? h : n.h[l];
+            n.h[l] = nearer ? h : n.h[l];
             n.key[l] = nearer ? key : n.key[l];
             n.x[l] = nearer ? xj : n.x[l], n.y[l] = nearer ? yj : n.y[l], n.z[l] = nearer ? zj : n.z[l];
             n.nx[l] = nearer ? nx : n.nx[l], n.ny[l] = nearer ? ny : n.ny[l], n.nz[l] = nearer ? nz : n.nz[l];
@@ -154,33 +151,33 @@ RILL_KERNEL void blend_gradients(const Field& f, const uint32_t* candidates, uin
 /// the air. Beyond all supports it gives a sign that holes and stray points cannot turn. Clusters seen from afar
 /// count as one disc.
 RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* out) {
-    float winding[lanes] = {}, lower[3] = {p.x[0], p.y[0], p.z[0]}, upper[3] = {p.x[0], p.y[0], p.z[0]};
-    const float* const rows[3] = {p.x, p.y, p.z};
-    for (int a = 0; a < 3; ++a)
-        for (uint32_t l = 0; l < lanes; ++l)
-            lower[a] = std::min(lower[a], rows[a][l]), upper[a] = std::max(upper[a], rows[a][l]);
-    const auto add = [&](float xj, float yj, float zj, float nx, float ny, float nz) __attribute__((always_inline)) {
+    constexpr float from_afar = 5;  // of radius²
+    float winding[lanes] = {}, near[lanes], afar[lanes];
+    const auto add = [&](const float* share, float xj, float yj, float zj, float nx, float ny, float nz)
+                         __attribute__((always_inline)) {
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = xj - p.x[l], ry = yj - p.y[l], rz = zj - p.z[l];
             const float d2 = rx * rx + ry * ry + rz * rz + 1e-20f;
-            winding[l] += (nx * rx + ny * ry + nz * rz) / (d2 * std::sqrt(d2));
+            winding[l] += share[l] * (nx * rx + ny * ry + nz * rz) / (d2 * std::sqrt(d2));
         }
     };
     for (uint32_t c = 0; c < f.cluster_count; ++c) {
         const Cluster& k = f.clusters[c];
-        float distance2 = 0;
-        for (int a = 0; a < 3; ++a) {
-            const float d = std::max({lower[a] - k.centre[a], k.centre[a] - upper[a], 0.f});
-            distance2 += d * d;
+        const float limit = from_afar * k.radius * k.radius;
+        float far_lanes = 0;
+        // Which lanes see it from afar is decided lane by lane: the batch must not matter.
+        for (uint32_t l = 0; l < lanes; ++l) {
+            const float rx = k.centre[0] - p.x[l], ry = k.centre[1] - p.y[l], rz = k.centre[2] - p.z[l];
+            afar[l] = rx * rx + ry * ry + rz * rz > limit ? 1.f : 0.f;
+            near[l] = 1 - afar[l];
         }
-        if (distance2 > 4 * k.radius * k.radius) {
-            add(k.centre[0], k.centre[1], k.centre[2], k.area[0], k.area[1], k.area[2]);
-            continue;
-        }
+        for (uint32_t l = 0; l < lanes; ++l) far_lanes += afar[l];
+        if (far_lanes > 0) add(afar, k.centre[0], k.centre[1], k.centre[2], k.area[0], k.area[1], k.area[2]);
+        if (far_lanes == float(lanes)) continue;
         for (uint32_t m = k.first; m < k.last; ++m) {
             const uint32_t j = f.cluster_member[m];
-            const float area = disc_area(f, j);
-            add(f.x[j], f.y[j], f.z[j], area * f.nx[j], area * f.ny[j], area * f.nz[j]);
+            const float area = f.area[j];
+            add(near, f.x[j], f.y[j], f.z[j], area * f.nx[j], area * f.ny[j], area * f.nz[j]);
         }
     }
     for (uint32_t l = 0; l < lanes; ++l) out[l] = winding[l];
@@ -189,14 +186,15 @@ RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* out)
 /// Signs for the first n positions where no patch has weight.
 void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& nearest, float* value) {
     bool any = false;
-    for (uint32_t l = 0; l < n; ++l) any |= nearest.far(l) && !nearest.above(l);
+    for (uint32_t l = 0; l < n; ++l) any |= nearest.far(l);
+    if (!any) return;
     float winding[lanes] = {};
-    if (any && f.point_count) winding_numbers(f, p, winding);
-    for (uint32_t l = 0; l < n; ++l)
-        if (nearest.far(l))
-            value[l] = nearest.above(l)                          ? nearest.h[l]
-                       : f.point_count && winding[l] > 0.5f ? -f.grid_cell
-                                                            : unsupported;
+    if (f.point_count) winding_numbers(f, p, winding);
+    for (uint32_t l = 0; l < n; ++l) {
+        if (!nearest.far(l)) continue;
+        const float distance = std::fabs(nearest.h[l]);
+        value[l] = winding[l] > 0.5f ? -std::min(distance, f.grid_cell) : distance;
+    }
 }
 
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t first, uint32_t count, const float* x,
@@ -323,8 +321,7 @@ void evaluate_gradient(const Field& f, const uint32_t* candidates, uint32_t cand
             const uint32_t i = first + l;
             value[i] = k.value[l];
             if (k.nearest.far(l) || !(sum.weight[l] > 0)) {
-                const float known = k.nearest.above(l) ? 1.f : 0.f;
-                gx[i] = known * k.nearest.nx[l], gy[i] = known * k.nearest.ny[l], gz[i] = known * k.nearest.nz[l];
+                gx[i] = gy[i] = gz[i] = 0;
                 if (vx) vx[i] = vy[i] = vz[i] = 0;
                 continue;
             }
