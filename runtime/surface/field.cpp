@@ -19,6 +19,7 @@ constexpr uint32_t support_neighbour = 6;  // R = support_scale · distance to t
 constexpr float support_scale = 1.4f;
 constexpr float same_side = 0.3f;          // least n·n of a row
 constexpr float most_alone = 1.8f;         // support relative to that of the points of either side
+constexpr float most_area = 0.3f;           // of the squared distance to the 6th neighbour of either side, over π
 constexpr float most_bend = 0.45f;         // |curvature|·R at most: a patch never curls over
 constexpr float ridge = 1e-3f;             // of the normalised normal equations: minimal norm when degenerate
 
@@ -237,10 +238,11 @@ void fit_patch(Field& f, uint32_t i) {
     const float spacing = std::min(spacing_of(f, neighbours), most_alone * around);
     const float support = spacing > 1e-4f * f.grid_cell ? support_scale * spacing : f.grid_cell;
     f.support[i] = support;
-    // k neighbours within d: on a surface one point in π d² / (k + ½). Far more even than a rule on the 6th.
+    // k neighbours within d: on a surface one point in π d² / (k + ½). Far more even than a rule on the 6th; but the
+    // neighbours of a droplet's points are other droplets'.
     const float last = neighbours.count >= support_neighbour ? neighbours.d2[neighbours.count - 1] / (float(neighbours.count) + 0.5f)
                                                              : 0.15f * spacing * spacing;
-    f.area[i] = 0.25f * last * f.activity[i];
+    f.area[i] = 0.25f * std::min(last, most_area * neighbours.any[support_neighbour - 1]) * f.activity[i];
     float quadratic[3] = {0, 0, 0};
     const Frame3 frame = tangents(f.nx[i], f.ny[i], f.nz[i]);
     if (neighbours.count >= 1 && spacing > 1e-4f * f.grid_cell) {

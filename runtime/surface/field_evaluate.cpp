@@ -26,7 +26,10 @@ constexpr uint32_t lanes = 32;
 // u² = (|r|² + flatten · (n·r)²) / R²: a patch reaches half as far along its normal as along the surface, or the
 // wide patches of a calm far side would speak for fine surface nearby.
 constexpr float flatten = 3;
-constexpr float core = 0.3f;            // of u²: the nearest point is this near, or the winding number decides
+// Where the nearest point is farther (in u²) than `trusted`, the winding number may overrule the blend if it is sure;
+// farther than `core` it decides alone.
+constexpr float core = 0.3f, trusted = 0.12f;
+constexpr float sure = 0.2f;            // of the winding number, from 0 or 1
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
 constexpr float agreeing = 0.7f;        // above this: full weight in A; between, patches of another face fade out
 constexpr float gate_scale = 1 / (agreeing - opposed);
@@ -41,6 +44,7 @@ struct Nearest {
     float key[lanes];  // squared distance / activity; a point that fades recedes
     float u2[lanes], h[lanes];  // of that point; h: height over its plane
     bool far(uint32_t l) const { return u2[l] > core; }
+    bool doubtful(uint32_t l) const { return u2[l] > trusted; }
     float x[lanes], y[lanes], z[lanes], nx[lanes], ny[lanes], nz[lanes];
 };
 /// Sums of the two clusters, and on which side of A the points of B lie.
@@ -184,16 +188,20 @@ RILL_KERNEL void winding_numbers(const Field& f, const Positions& p, float* out)
 }
 
 /// Signs for the first n positions where no patch has weight.
-void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& nearest, float* value) {
+void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& nearest, float* value,
+                float* sign) {
     bool any = false;
-    for (uint32_t l = 0; l < n; ++l) any |= nearest.far(l);
+    for (uint32_t l = 0; l < n; ++l) any |= nearest.doubtful(l);
     if (!any) return;
     float winding[lanes] = {};
     if (f.point_count) winding_numbers(f, p, winding);
     for (uint32_t l = 0; l < n; ++l) {
-        if (!nearest.far(l)) continue;
+        if (!nearest.doubtful(l)) continue;
+        const bool overrule = value[l] < 0 ? winding[l] < sure : winding[l] > 1 - sure;
+        if (!nearest.far(l) && !overrule) continue;
         const float distance = std::fabs(nearest.h[l]);
         value[l] = winding[l] > 0.5f ? -std::min(distance, f.grid_cell) : distance;
+        sign[l] = 0;
     }
 }
 
@@ -249,7 +257,7 @@ void blend(const Field& f, const uint32_t* candidates, uint32_t points, const fl
         const float other = sums.sum_b[l] / sums.weight_b[l];
         if (sums.side[l] < 0 ? other > k.value[l] : other < k.value[l]) k.value[l] = other, k.sign[l] = -1;
     }
-    decide_far(f, k.p, n, k.nearest, k.value);
+    decide_far(f, k.p, n, k.nearest, k.value, k.sign);
 }
 
 uint32_t count_points(const Field& f, const uint32_t* candidates, uint32_t count) {
@@ -320,7 +328,7 @@ void evaluate_gradient(const Field& f, const uint32_t* candidates, uint32_t cand
         for (uint32_t l = 0; l < some; ++l) {
             const uint32_t i = first + l;
             value[i] = k.value[l];
-            if (k.nearest.far(l) || !(sum.weight[l] > 0)) {
+            if (k.sign[l] == 0 || !(sum.weight[l] > 0)) {
                 gx[i] = gy[i] = gz[i] = 0;
                 if (vx) vx[i] = vy[i] = vz[i] = 0;
                 continue;
