@@ -150,6 +150,7 @@ const std::vector<FrameFormat>& frame_formats() {
         {".drc", "Draco sequence", read_drc},
         {".glb", "glTF sequence", read_gltf},
         {".gltf", "glTF sequence", read_gltf},
+        {".abc", "Alembic sequence", read_alembic_frame},
     };
     return formats;
 }

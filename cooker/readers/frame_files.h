@@ -39,9 +39,12 @@ std::unique_ptr<SequenceReader> open_frame_files(const FrameFormat& format, std:
 Mesh read_ply(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_obj(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_gltf(const std::filesystem::path& path, const ReadOptions& options);
+Mesh read_alembic_frame(const std::filesystem::path& path, const ReadOptions& options);  ///< its first sample
 
 /// Readers with a directory layout of their own; null when `directory` is not theirs.
 std::unique_ptr<SequenceReader> open_mantaflow(const std::filesystem::path& directory, const ReadOptions& options);
 std::unique_ptr<SequenceReader> open_flip_fluids(const std::filesystem::path& directory, const ReadOptions& options);
+/// The samples of one Alembic file.
+std::unique_ptr<SequenceReader> open_alembic(const std::filesystem::path& path, const ReadOptions& options);
 
 }  // namespace rill::cooker

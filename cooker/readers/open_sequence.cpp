@@ -39,6 +39,7 @@ std::unique_ptr<SequenceReader> open_files(const fs::path& path, const ReadOptio
     const bool pattern = is_pattern(path.filename().string()) && !fs::exists(path);
     if (!pattern && !fs::exists(path)) throw InputError(path.string() + ": no such file or directory");
     if (!format) throw InputError(path.string() + ": unknown format '" + path.extension().string() + "'; " + what_is_read());
+    if (!pattern && format->extension == ".abc") return open_alembic(path, options);
     std::vector<FrameFile> files;
     if (pattern) {
         const fs::path directory = path.has_parent_path() ? path.parent_path() : fs::path(".");
