@@ -39,7 +39,9 @@ int main(int argc, char** argv) {
     add_bench(app, run);
     try {
         app.parse(argc, argv);
-        return run();
+        const int code = run();
+        if (std::fflush(stdout) != 0 || std::ferror(stdout)) throw InputError("standard output: cannot be written");
+        return code;
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? exit_done : exit_usage;
     } catch (const UsageError& error) {

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 #include <sys/wait.h>
 
+#include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -20,9 +21,9 @@ struct Result {
     int code = -1;
     std::string text;  // standard output and error
 };
-Result run_rill(const std::string& arguments) {
+Result run_rill(const std::string& arguments, const std::string& before = "") {
     Result result;
-    FILE* pipe = popen((std::string("'" RILL_TOOL "' ") + arguments + " 2>&1").c_str(), "r");
+    FILE* pipe = popen(("exec 2>&1; " + before + "'" RILL_TOOL "' " + arguments).c_str(), "r");
     REQUIRE(pipe);
     char part[4096];
     for (size_t size; (size = fread(part, 1, sizeof part, pipe)) > 0;) result.text.append(part, size);
@@ -134,11 +135,55 @@ TEST_CASE("cook: bad input is 2, one line, and no asset") {
     bad.positions[7].x = std::nanf("");
     put_file(input + "/f3.ply", plain_ply(bad));
     check("f3.ply: position of vertex 7");
+    bad = Clip::frame(3);
+    bad.triangles[5][1] = uint32_t(bad.positions.size());
+    put_file(input + "/f3.ply", plain_ply(bad));
+    check("f3.ply: triangle 5 refers to vertex");
     put_file(input + "/f3.ply", plain_ply(Clip::frame(3)).substr(0, 5000));
     check("f3.ply");
+    fs::remove_all(input);
+    put_file(input + "/config/config_0001.uni", gzip(mantaflow_config(1, 24, {}, {1, 0, 0, 0, 1, 0, 0, 0, 1})));
+    put_file(input + "/mesh/lVelMesh_0001.uni", gzip(mantaflow_velocity(Clip::frame(1).velocities)));
+    const std::string packed = gzip(mantaflow_mesh(Clip::frame(1)));
+    put_file(input + "/mesh/fluid_mesh_0001.bobj.gz", packed.substr(0, packed.size() / 2));
+    check("fluid_mesh_0001.bobj.gz");
+    fs::remove(input + "/mesh/lVelMesh_0001.uni");
+    put_file(input + "/mesh/fluid_mesh_0001.bobj.gz", packed);
+    check("no velocity");
     const Result result = run_rill("cook " + clip().input + " -o " + (folder / "no/where.rill") + " --quiet");
     CHECK(result.code == 2);
     CHECK(has(result, "where.rill"));
+}
+
+TEST_CASE("output that cannot be written: 2, one line, nothing left behind") {
+    const TestFolder folder;
+    const auto check = [&](const Result& result, const std::string& cause, int left) {
+        CAPTURE(result.text);
+        CHECK(result.code == 2);
+        CHECK(has(result, cause));
+        CHECK(std::count(result.text.begin(), result.text.end(), '\n') == 1);
+        CHECK(std::distance(fs::directory_iterator(folder.path), {}) == left);
+    };
+    // A full disk, as a limit of 512 or 1024 bytes a file.
+    const std::string cook = "cook " + clip().input + " --error 0.5e --window 3 --quiet -o ";
+    check(run_rill(cook + (folder / "a.rill"), "trap '' XFSZ; ulimit -f 1; "), "a.rill", 0);
+    check(run_rill("export " + clip().asset + " --frames 3 -o " + (folder / "a%d.ply"), "trap '' XFSZ; ulimit -f 1; "), "a3.ply", 0);
+    check(run_rill("info --json " + clip().asset + " 3>&1 >/dev/full 2>&3"), "standard output", 0);
+    fs::create_directory(folder / "d");  // in the way
+    check(run_rill(cook + (folder / "d")), "d: cannot be written", 1);
+    check(run_rill("export " + clip().asset + " --frames 3 -o " + (folder / "no/a%d.ply")), "a3.ply", 1);
+}
+
+TEST_CASE("cook: a signal ends it, and nothing is left behind") {
+    const TestFolder folder;
+    const std::string asset = folder / "a.rill";
+    // The signal comes when the asset is under way.
+    const Result result = run_rill("cook " + clip().input + " -o " + asset + " --error 0.05e --jobs 1 --quiet & p=$!; while kill -0 $p && ! ls " +
+                                   asset + "* >/dev/null 2>&1; do sleep 0.01; done; kill -TERM $p; wait $p");
+    CAPTURE(result.text);
+    CHECK(result.code == 128 + SIGTERM);
+    CHECK(has(result, "interrupted"));
+    CHECK(fs::is_empty(folder.path));
 }
 
 TEST_CASE("cook: a single frame, and frames without liquid") {

@@ -37,7 +37,7 @@ struct InputOptions {
 };
 
 /// Progress of `total` frames on stderr: one line with rate and time left on a terminal, a plain line every
-/// quarter otherwise; the clock starts anew with every stage. Any thread, one at a time.
+/// quarter otherwise; the clock starts anew with every stage. Any thread, one at a time. Throws Interrupted.
 class Progress {
 public:
     Progress(std::string what, bool quiet);

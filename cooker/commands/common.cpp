@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "commands/commands.h"
+#include "interrupt.h"
 #include "output_file.h"
 
 namespace rill::cooker {
@@ -62,6 +63,7 @@ Progress::~Progress() {
 }
 
 void Progress::operator()(const std::string& stage, double done, double total) {
+    stop_if_interrupted();
     if (quiet_ || !(total > 0)) return;
     const auto now = std::chrono::steady_clock::now();
     if (stage != last_stage_) start_ = stage_end_, last_quarter_ = 0, last_stage_ = stage;

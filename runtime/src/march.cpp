@@ -182,7 +182,8 @@ void borrow_corners(const Mesher& m, Tile& tile) {
             if (!(from.known[source / 9] >> source % 9 & 1)) continue;
             tile.value[to] = from.value[source];
             tile.known[to / 9] |= uint16_t(1 << to % 9);
-            tile.inside[to / 9] |= uint16_t((from.inside[source / 9] >> source % 9 & 1) << to % 9);
+            const uint32_t bit = 1u << to % 9, sign = (from.inside[source / 9] >> source % 9 & 1) << to % 9;
+            tile.inside[to / 9] = uint16_t((tile.inside[to / 9] & ~bit) | sign);  // sign and value stay one
         }
     }
 }

@@ -20,7 +20,7 @@ constexpr float support_scale = 1.4f;
 constexpr float same_side = 0.3f;          // least n·n of a row
 constexpr float most_alone = 1.8f;         // support relative to that of the points of either side
 constexpr float most_area = 0.3f;           // of the squared distance to the 6th neighbour of either side, over π
-constexpr float most_bend = 0.45f;         // |curvature|·R at most: a patch never curls over
+constexpr float most_bend = 0.9f;          // |curvature|·R at most: a patch never curls over
 constexpr float ridge = 1e-3f;             // of the normalised normal equations: minimal norm when degenerate
 
 size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
