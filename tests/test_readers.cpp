@@ -153,16 +153,23 @@ TEST_CASE("Mantaflow cache: damage") {
     CHECK_FAULT(fault(input), "frame 2 is missing");
 }
 
-TEST_CASE("a Mantaflow cache without any velocity is read, but not where velocity is needed") {
+TEST_CASE("a Mantaflow cache without any velocity is read; where velocity is needed, it is estimated and told") {
     const TestFolder folder;
     put_cache(folder.path, 1, 2);
     for (int frame : {1, 2}) fs::remove(folder.path / "mesh" / ("lVelMesh_000" + std::to_string(frame) + ".uni"));
     CHECK(open_sequence(folder.path.string(), {})->info().velocity == VelocityMeaning::none);
     ReadOptions options;
+    std::string warning;
+    options.warn = [&](const std::string& text) { warning = text; };
     options.require_velocity = true;
-    CHECK_FAULT(fault(folder.path.string(), options), "fluid_mesh_0001", "no velocity");
+    const auto reader = open_sequence(folder.path.string(), options);
+    CHECK(reader->info().velocity == VelocityMeaning::forward);
+    CHECK(reader->read(0).velocities.size() == reader->read(0).positions.size());
+    CHECK_FAULT(warning, "fluid_mesh_0001", "no velocity", "estimate");
+    warning.clear();
     options.velocity_name = "estimate";
-    CHECK_THROWS_AS(open_sequence(folder.path.string(), options), UsageError);
+    CHECK(open_sequence(folder.path.string(), options)->info().velocity == VelocityMeaning::forward);
+    CHECK(warning.empty());
 }
 
 TEST_CASE("PLY sequence by directory, pattern, glob and single file") {
@@ -259,9 +266,12 @@ TEST_CASE("PLY velocity by name") {
     CHECK(open_sequence(folder / "f1.ply", options)->read(0).velocities == ball.velocities);
     options.velocity_name = "swirl";
     CHECK_FAULT(fault(folder / "f1.ply", options), "f1.ply", "swirl");
-    options = {};
-    options.require_velocity = true;
-    CHECK_FAULT(fault(folder / "f1.ply", options), "f1.ply", "no velocity");
+    for (const char* name : {"velocity_", "vel", "Velocity.", "flip_velocity_", "v_"}) {
+        std::string other = plain_ply(ball);
+        for (const char* axis : {"x", "y", "z"}) other.replace(other.find(std::string("v") + axis), 2, std::string(name) + axis);
+        put_file(folder / "f1.ply", other);
+        CHECK(open_sequence(folder / "f1.ply", {})->read(0).velocities == ball.velocities);
+    }
 }
 
 TEST_CASE("PLY damage") {

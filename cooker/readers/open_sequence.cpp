@@ -2,6 +2,7 @@
 // A path → the reader for what lies there.
 #include <cmath>
 
+#include "estimate_velocity.h"
 #include "readers/frame_files.h"
 #include "sequence_to_frames.h"
 
@@ -58,11 +59,17 @@ std::unique_ptr<SequenceReader> open_sequence(const std::string& input, const Re
         throw UsageError("the frame rate must be positive");
     if (options.step < 0 || (options.step > 0 && options.last < options.first))
         throw UsageError("frames A:B:S need A <= B and S >= 1");
-    if (options.velocity_name == "estimate")
-        throw UsageError("--velocity estimate is not available in this version: export the velocity with the mesh");
+    const bool estimate = options.velocity_name == "estimate";
+    ReadOptions source = options;
+    if (estimate) source.velocity_name.clear(), source.velocity_per_frame = false;
+    source.require_velocity = false;  // what is missing is estimated
     try {
         const fs::path path(input);
-        return sequence_to_frames(fs::is_directory(path) ? open_directory(path, options) : open_files(path, options), options);
+        auto frames = sequence_to_frames(fs::is_directory(path) ? open_directory(path, source) : open_files(path, source), source);
+        const bool missing = frames->info().velocity == VelocityMeaning::none && options.require_velocity;
+        if (missing && !estimate && options.warn)
+            options.warn(frames->name(0) + ": no velocity; it is estimated from the surfaces (--velocity estimate; exported velocity is better)");
+        return missing || estimate ? estimate_velocity(std::move(frames)) : std::move(frames);
     } catch (const fs::filesystem_error& error) {
         throw InputError(input + ": " + error.code().message());
     }

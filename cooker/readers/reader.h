@@ -29,9 +29,9 @@ struct SequenceInfo {
 struct ReadOptions {
     double frames_per_second = 0;  ///< 0: what the source says, else 24
     int first = 0, last = 0, step = 0;  ///< --frames A:B:S; step 0: all frames
-    std::string velocity_name;     ///< attribute; empty: names users know (see README)
+    std::string velocity_name;     ///< attribute; empty: names users know (see README); "estimate": from the surfaces
     bool velocity_per_frame = false;
-    bool require_velocity = false; ///< a source without velocity is an InputError, already on opening
+    bool require_velocity = false; ///< a source without velocity gets an estimate, and `warn` is told
     /// Told in one line what was put right or guessed; may be called from several threads, one at a time.
     std::function<void(const std::string&)> warn;
 };
