@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: MIT
+// The whole way: meshes of a liquid whose every moment is known are cooked, and what the runtime makes of the asset
+// is held against them.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "asset_player.h"
+#include "cook.h"
+#include "sequence_files.h"
+#include "shapes.h"
+#include "surface_distance.h"
+
+using namespace rill::cooker;
+
+namespace {
+
+constexpr double fps = 24;
+
+/// A ball that sways and is squeezed, beside a ring that drifts and turns: x = A(t) X + c(t), volumes kept.
+struct Motion {
+    glm::mat3 shape{1};
+    glm::vec3 centre{};
+    glm::vec3 operator()(const glm::vec3& x) const { return shape * x + centre; }
+};
+Motion ball(double t) {
+    const float squeeze = 1 + 0.15f * float(std::sin(6 * t));
+    return {{{squeeze, 0, 0}, {0, 1 / squeeze, 0}, {0, 0, 1}}, {0.3f * float(std::sin(4 * t)), 0, 0}};
+}
+Motion ring(double t) {
+    const float c = float(std::cos(2 * t)), s = float(std::sin(2 * t));
+    return {{{c, 0, s}, {0, 1, 0}, {-s, 0, c}}, {0, 0.6f * float(t), 1.6f}};
+}
+glm::vec3 velocity(Motion (*motion)(double), double t, const glm::vec3& material) {
+    const double step = 1e-3;
+    return (motion(t + step)(material) - motion(t - step)(material)) / float(2 * step);
+}
+
+Mesh torus(uint32_t around, uint32_t across, float major, float minor) {
+    Mesh mesh;
+    for (uint32_t i = 0; i < around; ++i)
+        for (uint32_t k = 0; k < across; ++k) {
+            const float u = 6.2831853f * float(i) / float(around), v = 6.2831853f * float(k) / float(across);
+            const float r = major + minor * std::cos(v);
+            mesh.positions.push_back({r * std::cos(u), r * std::sin(u), minor * std::sin(v)});
+            const uint32_t a = i * across + k, b = (i + 1) % around * across + k;
+            const uint32_t c = i * across + (k + 1) % across, d = (i + 1) % around * across + (k + 1) % across;
+            mesh.triangles.push_back({a, b, d}), mesh.triangles.push_back({a, d, c});
+        }
+    return mesh;
+}
+void move(Mesh& mesh, Motion (*motion)(double), double t) {
+    mesh.velocities.clear();
+    for (glm::vec3& x : mesh.positions) mesh.velocities.push_back(velocity(motion, t, x)), x = motion(t)(x);
+}
+Mesh liquid(double t) {
+    Mesh mesh = sphere(32, 0.5f), other = torus(48, 20, 0.5f, 0.2f);
+    move(mesh, ball, t), move(other, ring, t);
+    append(mesh, other);
+    return mesh;
+}
+/// What the liquid does at x, whose motion is that of the nearer of the two.
+glm::vec3 true_velocity(double t, const glm::vec3& x) {
+    Motion (*motion)(double) = x.z < 0.8f ? ball : ring;
+    return velocity(motion, t, glm::inverse(motion(t).shape) * (x - motion(t).centre));
+}
+
+constexpr int first_frame = 11, frames = 8;
+
+struct Cooked {
+    TestFolder folder;
+    std::string input = folder / "in", asset = folder / "out.rill";
+    CookSettings settings;
+    CookReport report;
+
+    explicit Cooked(const std::function<Mesh(int)>& frame, int count = frames) {
+        for (int i = 0; i < count; ++i) put_file(input + "/f" + std::to_string(first_frame + i) + ".ply", plain_ply(frame(i)));
+        settings.error = "0.3e", settings.window = 3, settings.jobs = 2, settings.layers = 3;
+    }
+    Cooked& cook() {
+        report = rill::cooker::cook(input, asset, settings, [](const CookProgress&) {});
+        return *this;
+    }
+};
+Mesh of_frame(int i) { return liquid(i / fps); }
+
+const Cooked& whole() {
+    static Cooked cooked(of_frame);
+    static const Cooked& done = cooked.cook();
+    return done;
+}
+/// Nothing on one side only: infinitely far.
+SurfaceDistance distance(const Mesh& a, const Mesh& b) { return surface_distance(a, SurfaceIndex(a), b, SurfaceIndex(b)); }
+
+}  // namespace
+
+TEST_CASE("the decoded surface lies within the promised error, in every frame") {
+    const Cooked& cooked = whole();
+    INFO("p99 ", cooked.report.measured_p99, ", aimed at ", cooked.report.target_p99);
+    CHECK(cooked.report.target_met);
+    AssetPlayer player(cooked.asset);
+    CHECK(player.info().frames == frames);
+    CHECK(player.info().first_frame == first_frame);
+    CHECK(player.info().windows == 3);
+    DistanceHistogram all;
+    for (uint32_t i = 0; i < frames; ++i) {
+        CAPTURE(i);
+        CHECK(player.frame_seconds(i) == doctest::Approx(i / fps));
+        const Mesh source = of_frame(int(i)), decoded = player.mesh(player.frame_seconds(i));
+        const SurfaceDistance d = distance(source, decoded);
+        all.add(d.histogram);
+        CHECK(d.p99 < 1.5 * cooked.report.target_p99);
+        CHECK(d.normal_degrees < 10);
+        const Topology shape = topology(decoded);
+        CHECK(shape.open_edges == 0);
+        CHECK(shape.non_manifold_edges == 0);
+        CHECK(shape.components == 2);
+        CHECK(shape.volume == doctest::Approx(signed_volume(source)).epsilon(0.03));
+    }
+    // What the report says is what is.
+    CHECK(all.quantile(0.99) == doctest::Approx(cooked.report.measured_p99).epsilon(0.05));
+}
+
+TEST_CASE("between frames the surface is where the liquid was") {
+    AssetPlayer player(whole().asset);
+    for (double frame : {0.5, 2.25, 3.5, 6.75}) {
+        CAPTURE(frame);
+        const SurfaceDistance d = distance(liquid(frame / fps), player.mesh(frame / fps));
+        CHECK(d.p99 < 2 * whole().report.target_p99);
+        CHECK(d.mean < whole().report.target_p99);
+    }
+}
+
+TEST_CASE("the same input gives the same bytes at 1, 2 and 8 jobs") {
+    const std::string bytes = get_file(whole().asset);
+    Cooked again(of_frame);
+    for (int jobs : {1, 8}) {
+        CAPTURE(jobs);
+        again.settings.jobs = jobs;
+        CHECK(get_file(again.cook().asset) == bytes);
+    }
+}
+
+TEST_CASE("layers: the first is closed, and each brings the surface nearer") {
+    AssetPlayer player(whole().asset);
+    REQUIRE(player.info().layers == 3);
+    for (uint32_t i : {1u, 5u}) {
+        CAPTURE(i);
+        const Mesh source = of_frame(int(i));
+        double before = 1e30;
+        for (uint32_t layers = 1; layers <= 3; ++layers) {
+            CAPTURE(layers);
+            const Mesh decoded = player.mesh(i / fps, 0, layers);
+            const Topology shape = topology(decoded);
+            CHECK(shape.open_edges == 0);
+            CHECK(shape.non_manifold_edges == 0);
+            const double mean = distance(source, decoded).mean;
+            CHECK(mean < before);
+            before = mean;
+        }
+    }
+}
+
+TEST_CASE("at a window's border nothing pops: either side is within the coding error of the same frame") {
+    AssetPlayer player(whole().asset);
+    for (int border : {3, 6}) {
+        CAPTURE(border);
+        const double t = border / fps, nearly = 1e-6;
+        const Mesh before = player.mesh(t - nearly), after = player.mesh(t + nearly);
+        CHECK(distance(before, after).p99 < 2 * whole().report.target_p99);
+    }
+}
+
+TEST_CASE("velocity: that of the liquid, and of the surface itself") {
+    AssetPlayer player(whole().asset);
+    for (double frame : {0.5, 1.5, 4.0, 4.5}) {
+        CAPTURE(frame);
+        const double t = frame / fps;
+        const Mesh mesh = player.mesh(t);
+        REQUIRE(mesh.velocities.size() == mesh.positions.size());
+        // Along the surface the points may slide (it looks the same); across it they may not.
+        double wrong = 0, speed = 0;
+        for (size_t i = 0; i < mesh.positions.size(); ++i) {
+            const glm::vec3 truth = true_velocity(t, mesh.positions[i]);
+            wrong += std::fabs(glm::dot(mesh.velocities[i] - truth, mesh.normals[i])), speed += glm::length(truth);
+        }
+        CHECK(wrong < 0.2 * speed);
+        // Moved by its own velocity, the surface meets itself a moment later.
+        const double step = 0.25 / fps;
+        Mesh moved = mesh;
+        for (size_t i = 0; i < moved.positions.size(); ++i) moved.positions[i] += float(step) * moved.velocities[i];
+        const Mesh later = player.mesh(t + step);
+        const double stayed = distance(mesh, later).mean, went = distance(moved, later).mean;
+        INFO("moved ", went, ", unmoved ", stayed);
+        CHECK(went < 0.3 * stayed);
+    }
+}
+
+TEST_CASE("closed at cells of 1, 2 and 4 times the source's, and coarser with each") {
+    AssetPlayer player(whole().asset);
+    const float cell = player.info().cell_size;
+    size_t before = SIZE_MAX;
+    for (float times : {1.f, 2.f, 4.f}) {
+        CAPTURE(times);
+        const Mesh mesh = player.mesh(2.5 / fps, times * cell);
+        const Topology shape = topology(mesh);
+        CHECK(shape.open_edges == 0);
+        CHECK(shape.non_manifold_edges == 0);
+        CHECK(mesh.triangles.size() < before);
+        before = mesh.triangles.size();
+        if (times > 2) continue;  // drawn with fewer layers
+        CHECK(shape.components == 2);
+        CHECK(shape.volume == doctest::Approx(signed_volume(liquid(2.5 / fps))).epsilon(0.15));
+    }
+}
+
+TEST_CASE("liquid that is gone for some frames, and liquid that comes late") {
+    const auto there = [](int i) { return i != 2 && i != 3 && i != 4; };
+    Cooked cooked([&](int i) { return there(i) ? of_frame(i) : Mesh{}; });
+    cooked.settings.error = "0.5e";
+    cooked.cook();
+    AssetPlayer player(cooked.asset);
+    for (uint32_t i = 0; i < frames; ++i) {
+        CAPTURE(i);
+        const Mesh decoded = player.mesh(player.frame_seconds(i));
+        CHECK(decoded.triangles.empty() == !there(int(i)));
+        if (there(int(i))) CHECK(distance(of_frame(int(i)), decoded).p99 < 2 * cooked.report.target_p99);
+    }
+}
+
+TEST_CASE("a single frame, and windows of a single frame") {
+    Cooked one(of_frame, 1);
+    one.cook();
+    AssetPlayer still(one.asset);
+    CHECK(still.info().seconds == 0);
+    CHECK(distance(of_frame(0), still.mesh(0)).p99 < 1.2 * one.report.target_p99);
+
+    Cooked many(of_frame, 4);
+    many.settings.window = 1;
+    many.cook();
+    AssetPlayer player(many.asset);
+    CHECK(player.info().windows == 3);
+    for (uint32_t i = 0; i < 4; ++i) CHECK(distance(of_frame(int(i)), player.mesh(i / fps)).p99 < 1.5 * many.report.target_p99);
+}
+
+TEST_CASE("a cook that is stopped, or cannot be written, leaves nothing behind") {
+    struct Stop {};
+    Cooked cooked(of_frame, 4);
+    for (const char* stage : {"surveying", "cooking", "measuring"}) {
+        CAPTURE(stage);
+        CHECK_THROWS_AS(cook(cooked.input, cooked.asset, cooked.settings, [&](const CookProgress& p) { if (p.stage == stage) throw Stop(); }), Stop);
+        CHECK(std::distance(std::filesystem::directory_iterator(cooked.folder.path), {}) == 1);
+    }
+    cooked.asset = cooked.folder / "no/where.rill";
+    CHECK_THROWS_AS(cooked.cook(), InputError);
+}
