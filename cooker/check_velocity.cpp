@@ -90,6 +90,17 @@ std::string text(const char* format, double value) {
     return buffer;
 }
 
+/// How many frames long each pair seems to be: 1, unless another length fits it clearly better.
+double length_of(const Moved& pair, double factor) {
+    const std::vector<Moved> one = {pair};
+    const double plain = share(one, factor);
+    double best = plain, length = 1;
+    for (double tried = 0.25; tried <= 2.5; tried += 0.125)
+        if (const double s = share(one, factor * tried); s < best) best = s, length = tried;
+    const bool clear = pair.position.size() >= fewest_samples / 2 && best < 0.4 && best < 0.6 * plain && !near(length, 1);
+    return clear ? length : 1;
+}
+
 /// The factor that somebody could have meant, and the words for it.
 double likely(double factor, double rate, double longest, std::string& words) {
     if (near(factor, rate)) {
@@ -123,6 +134,7 @@ VelocityFit check_velocity(const SequenceReader& reader, const std::function<voi
     std::vector<std::unique_ptr<Mesh>> meshes;
     std::vector<std::unique_ptr<SurfaceIndex>> indices;
     std::vector<Moved> forward, backward;
+    std::vector<size_t> looked_at;  // the first frame of each pair
     glm::vec3 lower(1e30f), upper(-1e30f);
     for (size_t p = 0; p < pairs; ++p) {
         const size_t k = (info.numbers.size() - 1) * (2 * p + 1) / (2 * pairs);
@@ -134,6 +146,7 @@ VelocityFit check_velocity(const SequenceReader& reader, const std::function<voi
         const Mesh &a = *meshes[2 * p], &b = *meshes[2 * p + 1];
         if (a.triangles.empty() || b.triangles.empty()) continue;
         const double seconds = info.seconds[k + 1] - info.seconds[k];
+        looked_at.push_back(k);
         forward.push_back(moved(a, *indices[2 * p + 1], seconds));
         backward.push_back(moved(b, *indices[2 * p], -seconds));
     }
@@ -162,14 +175,22 @@ VelocityFit check_velocity(const SequenceReader& reader, const std::function<voi
     }
     fit.meaning = measured;
     // A factor that is nearly 1 is 1: free fall between frames, solver walls and noise bend the fit.
-    if (near(best.factor, 1) || plain < best.share + 0.1) return fit;
+    const bool fits = near(best.factor, 1) || plain < best.share + 0.1;
     std::string words;
     const glm::vec3 size = upper - lower;
-    fit.factor = likely(best.factor, info.frames_per_second, std::max({size.x, size.y, size.z}), words);
-    fit.carried = best.share * fit.still;
-    if (warn)
+    if (!fits) fit.factor = likely(best.factor, info.frames_per_second, std::max({size.x, size.y, size.z}), words);
+    if (!fits) fit.carried = best.share * fit.still;
+    if (!fits && warn)
         warn(info.path + ": the velocity fits when multiplied by " + text("%.4g", fit.factor) + " (" + text("%.3g mm", fit.carried * 1000) +
              " off instead of " + text("%.3g", fit.as_stored * 1000) + "): " + words);
+    for (size_t p = 0; p < looked_at.size(); ++p)
+        if (const double length = length_of((is_back ? backward : forward)[p], fit.factor); length != 1) {
+            if (warn)
+                warn(info.path + ": frames are unevenly spaced in time: from frame " + std::to_string(info.numbers[looked_at[p]]) + " to " +
+                     std::to_string(info.numbers[looked_at[p] + 1]) + text(" the surface moves as in %.3g of the time stated", length) +
+                     (info.format == "FLIP Fluids cache" ? "; keep the cache's logs/ folder, which tells the times" : ""));
+            break;
+        }
     return fit;
 }
 
@@ -181,6 +202,7 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return source_->name(index); }
+    Mesh read_surface(size_t index) const override { return source_->read_surface(index); }
     Mesh read(size_t index) const override {
         Mesh mesh = source_->read(index);
         if (factor_ != 1)

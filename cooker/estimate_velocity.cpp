@@ -111,14 +111,15 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return source_->name(index); }
+    Mesh read_surface(size_t index) const override { return source_->read_surface(index); }
     Mesh read(size_t index) const override {
-        Mesh mesh = source_->read(index);
+        Mesh mesh = source_->read_surface(index);
         const size_t last = info_.seconds.size() - 1;
         mesh.velocities.assign(mesh.positions.size(), glm::vec3(0));
         if (last == 0 || mesh.triangles.empty()) return mesh;
         const size_t other = index < last ? index + 1 : index - 1;
         const double seconds = info_.seconds[other] - info_.seconds[index];  // negative at the end
-        mesh.velocities = estimate_motion(mesh, source_->read(other));
+        mesh.velocities = estimate_motion(mesh, source_->read_surface(other));
         for (glm::vec3& v : mesh.velocities) v *= float(1 / seconds);
         return mesh;
     }

@@ -90,6 +90,21 @@ TEST_CASE("wrong units and signs: the likely factor") {
     }
 }
 
+TEST_CASE("frames that are not as far apart in time as stated") {
+    TestFolder folder;  // frame 6 is taken half a frame early
+    for (int frame = 3; frame <= 9; ++frame) {
+        Mesh mesh = ball(0, true, 1);
+        for (glm::vec3& x : mesh.positions) x.z -= 0.12f * (frame == 6 ? 5.5f : float(frame));
+        mesh.velocities.assign(mesh.positions.size(), {0, 0, -0.12f * 24});
+        put_file(folder / ("f" + std::to_string(frame) + ".ply"), plain_ply(mesh));
+    }
+    std::string warning;
+    const VelocityFit fit = fit_of(*open_sequence(folder.path.string(), {}), warning);
+    CHECK(fit.conclusive);
+    CHECK(fit.factor == 1);
+    CHECK_FAULT(warning, "unevenly", "frame 5 to 6", "0.5");
+}
+
 TEST_CASE("velocity of something else, no velocity, nothing that moves") {
     std::string warning;
     TestFolder folder;

@@ -43,6 +43,8 @@ public:
     /// Frame `index` of info().numbers, checked: finite, indices in range; no triangles is legal.
     /// Thread safe. Throws InputError naming file and cause.
     virtual Mesh read(size_t index) const = 0;
+    /// The same for those who need no velocity: it may be left out where it costs time (estimated velocity).
+    virtual Mesh read_surface(size_t index) const { return read(index); }
     /// What messages call frame `index`: its file.
     virtual std::string name(size_t index) const = 0;
 };
