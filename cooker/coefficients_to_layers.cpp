@@ -2,7 +2,7 @@
 // Progressive order: every prefix of layers is an even covering of the surface, in every frame of the window.
 //
 // Sample elimination over lives (after Yuksel 2015): layer l takes a track when somewhere in its life nothing taken
-// before lies within 2^((last − l)/2) local spacings, long lives first. Spacing is relative, so every layer keeps the
+// before lies within so many local spacings that about 2^(l − last) of all are taken, long lives first. Spacing is relative, so every layer keeps the
 // adaptivity of the whole set.
 #include <algorithm>
 #include <cmath>
@@ -55,6 +55,20 @@ std::vector<std::vector<Standing>> standings(const Window& window) {
     return result;
 }
 
+/// Takes every track that stands anywhere with nothing taken within `room` spacings; returns how many are taken.
+size_t cover(const std::vector<std::vector<Standing>>& standing, const std::vector<uint32_t>& order, float room,
+             std::vector<bool>& taken) {
+    for (uint32_t i : order) {
+        if (taken[i]) continue;
+        taken[i] = std::any_of(standing[i].begin(), standing[i].end(), [&](const Standing& at) {
+            return std::none_of(at.neighbours.begin(), at.neighbours.end(), [&](const auto& neighbour) {
+                return taken[neighbour.first] && neighbour.second < room;
+            });
+        });
+    }
+    return size_t(std::count(taken.begin(), taken.end(), true));
+}
+
 }  // namespace
 
 std::vector<uint32_t> assign_layers(const Window& window, uint32_t layers) {
@@ -65,16 +79,20 @@ std::vector<uint32_t> assign_layers(const Window& window, uint32_t layers) {
     std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return life(a) > life(b); });
     std::vector<bool> taken(window.paths.size(), false);
     for (uint32_t l = 0; l + 1 < layers; ++l) {
-        const float room = std::exp2(0.5f * float(layers - 1 - l));
-        for (uint32_t i : order) {
-            if (taken[i]) continue;
-            const bool bare = std::any_of(standing[i].begin(), standing[i].end(), [&](const Standing& at) {
-                return std::none_of(at.neighbours.begin(), at.neighbours.end(), [&](const auto& neighbour) {
-                    return taken[neighbour.first] && neighbour.second < room;
-                });
-            });
-            if (bare) taken[i] = true, layer[i] = l;
+        // The room that takes about half as many as the layer after will have in all.
+        const size_t wanted = window.paths.size() >> (layers - 1 - l);
+        float narrow = 0.25f, wide = 8;
+        std::vector<bool> best = taken;
+        for (int step = 0; step < 7; ++step) {
+            const float room = std::sqrt(narrow * wide);
+            std::vector<bool> trial = taken;
+            const size_t count = cover(standing, order, room, trial);
+            (count < wanted ? wide : narrow) = room;
+            best = std::move(trial);
         }
+        for (uint32_t i = 0; i < taken.size(); ++i)
+            if (best[i] && !taken[i]) layer[i] = l;
+        taken = std::move(best);
     }
     return layer;
 }

@@ -11,7 +11,7 @@ namespace rill::cooker {
 namespace {
 
 constexpr int coding_rounds = 2;
-constexpr int first_rounds = 8, later_rounds = 3;  // of births in the clip's first frame, and in the others
+constexpr int first_rounds = 8, later_rounds = 1;  // of births in the clip's first frame, and in the others
 constexpr int patience = 4;                        // frames a track is surplus before it dies
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend

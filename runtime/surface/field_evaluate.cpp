@@ -42,7 +42,8 @@ struct Positions {
 /// The point nearest to each position among those whose support holds it.
 struct Nearest {
     float key[lanes];  // squared distance / activity; a point that fades recedes
-    float u2[lanes], h[lanes];  // of that point; h: height over its plane
+    float h[lanes];    // over the plane of that point
+    float u2[lanes];   // least of any point: in a thin sheet the nearest may be of the other face
     bool far(uint32_t l) const { return u2[l] > core; }
     bool doubtful(uint32_t l) const { return u2[l] > trusted; }
     float x[lanes], y[lanes], z[lanes], nx[lanes], ny[lanes], nz[lanes];
@@ -79,7 +80,8 @@ RILL_KERNEL void find_nearest(const Field& f, const uint32_t* candidates, uint32
             const float d2 = rx * rx + ry * ry + rz * rz, h = nx * rx + ny * ry + nz * rz;
             const float key = d2 < reach ? d2 * recede : unsupported;
             const bool nearer = key < n.key[l];
-            n.u2[l] = nearer ? (d2 + flatten * h * h) * inverse : n.u2[l];
+            const float u2 = (d2 + flatten * h * h) * inverse;
+            n.u2[l] = u2 < n.u2[l] ? u2 : n.u2[l];
             n.h[l] = nearer ? h : n.h[l];
             n.key[l] = nearer ? key : n.key[l];
             n.x[l] = nearer ? xj : n.x[l], n.y[l] = nearer ? yj : n.y[l], n.z[l] = nearer ? zj : n.z[l];
@@ -214,6 +216,8 @@ void add_drops(const Field& f, const uint32_t* candidates, uint32_t first, uint3
                     xz = f.inverse[4][d], yz = f.inverse[5][d];
         for (uint32_t i = 0; i < n; ++i) {
             const float rx = x[i] - f.dx[d], ry = y[i] - f.dy[d], rz = z[i] - f.dz[d];
+            // gather() knows no drop beyond its reach: the box asked for must not matter.
+            if (rx * rx + ry * ry + rz * rz >= f.reach[d] * f.reach[d]) continue;
             const float ex = xx * rx + xy * ry + xz * rz, ey = xy * rx + yy * ry + yz * rz,
                         ez = xz * rx + yz * ry + zz * rz;
             const float length = std::sqrt(ex * ex + ey * ey + ez * ez);
@@ -251,11 +255,13 @@ void blend(const Field& f, const uint32_t* candidates, uint32_t points, const fl
     Blend sums;
     blend_values(f, candidates, points, k.p, k.nearest, sums);
     for (uint32_t l = 0; l < lanes; ++l) {
-        k.sign[l] = k.nearest.far(l) ? 0.f : 1.f;
-        k.value[l] = sums.sum_a[l] / sums.weight_a[l];
-        if (k.nearest.far(l) || !(sums.weight_b[l] > 0)) continue;
-        const float other = sums.sum_b[l] / sums.weight_b[l];
-        if (sums.side[l] < 0 ? other > k.value[l] : other < k.value[l]) k.value[l] = other, k.sign[l] = -1;
+        const bool has_a = sums.weight_a[l] > 0, has_b = sums.weight_b[l] > 0;
+        if (!has_a && !has_b) k.nearest.u2[l] = unsupported;
+        const float a = has_a ? sums.sum_a[l] / sums.weight_a[l] : unsupported;
+        const float b = has_b ? sums.sum_b[l] / sums.weight_b[l] : a;
+        const bool use_b = !has_a || (sums.side[l] < 0 ? b > a : b < a);
+        k.value[l] = use_b ? b : a;
+        k.sign[l] = k.nearest.far(l) ? 0.f : use_b ? -1.f : 1.f;
     }
     decide_far(f, k.p, n, k.nearest, k.value, k.sign);
 }
