@@ -5,11 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
+#include "check_velocity.h"
 #include "chunks_to_asset.h"
 #include "error_target.h"
 #include "frames_to_tracks.h"
 #include "parallel.h"
-#include "sequence_to_frames.h"
 #include "verify.h"
 
 namespace rill::cooker {
@@ -39,7 +39,7 @@ Survey survey(const SequenceReader& reader, int jobs, const std::function<void(u
     std::vector<Facts> facts(reader.info().numbers.size());
     std::atomic<uint32_t> count{0};
     parallel_for(facts.size(), jobs, [&](size_t i) {
-        const Mesh mesh = reader.read(i);
+        const Mesh mesh = reader.read_surface(i);
         Facts& f = facts[i];
         for (const Triangle& t : mesh.triangles)
             for (uint32_t v : t) f.lower = glm::min(f.lower, mesh.positions[v]), f.upper = glm::max(f.upper, mesh.positions[v]);
@@ -293,7 +293,9 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     check(settings);
     ReadOptions options = settings.read;
     options.require_velocity = true;
-    const auto reader = sequence_to_frames(open_sequence(input, options), options);
+    auto reader = open_sequence(input, options);
+    const VelocityFit fit = check_velocity(*reader, options.warn);
+    reader = apply_fit(std::move(reader), fit);
     const uint32_t frames = uint32_t(reader->info().numbers.size());
     const Survey facts = survey(*reader, settings.jobs, [&](uint32_t done) { progress({done, frames, "surveying"}); });
     CookReport report;

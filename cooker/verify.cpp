@@ -92,7 +92,7 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
         AssetPlayer player(asset);
         for (size_t i = numbers.size() * part / threads; i < numbers.size() * (part + 1) / threads; ++i) {
             const double seconds = player.frame_seconds(uint32_t((numbers[i] - first) / directory.header.frame_step));
-            FrameMeasure& frame = result.frames[i] = measure(source.read(i), player.mesh(seconds));
+            FrameMeasure& frame = result.frames[i] = measure(source.read_surface(i), player.mesh(seconds));
             frame.number = numbers[i], frame.seconds = seconds;
             const std::lock_guard lock(mutex);
             if (progress) progress(++done, uint32_t(numbers.size()));

@@ -107,7 +107,7 @@ std::string worst_frames(const Verification& v, const SequenceReader& source, co
     std::string html;
     for (size_t i : chosen) {
         const FrameMeasure& f = v.frames[i];
-        const Mesh mesh = source.read(i), decoded = player.mesh(f.seconds);
+        const Mesh mesh = source.read_surface(i), decoded = player.mesh(f.seconds);
         std::vector<float> heat = surface_distance(mesh, SurfaceIndex(mesh), decoded, SurfaceIndex(decoded), true).per_source_vertex;
         heat.resize(mesh.positions.size());
         for (float& h : heat) h = scale > 0 ? h / scale : 0;
