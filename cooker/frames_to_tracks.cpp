@@ -11,7 +11,7 @@ namespace rill::cooker {
 namespace {
 
 constexpr int coding_rounds = 2;
-constexpr int first_rounds = 8, later_rounds = 1;  // of births in the clip's first frame, and in the others
+constexpr int most_rounds = 8;  // of births at one frame
 constexpr int patience = 4;                        // frames a track is surplus before it dies
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
@@ -127,17 +127,21 @@ size_t bear_tracks(Window& window, int sample, const Residual& residual, const s
 }
 
 /// Corrections and births at one frame until little is missed.
-void fill_frame(Window& window, int sample, int rounds, const WindowGoal& goal) {
+void fill_frame(Window& window, int sample, const WindowGoal& goal) {
     const SurfaceFrame& frame = *window.frames[size_t(sample)];
+    // What a round leaves is the next frame's to mend, unless there was much.
+    const size_t enough = alive_at(window, sample).ids.empty() ? 100 : 6;
+    bool last = false;
     for (int round = 0;; ++round) {
         Sweep sweep = alive_at(window, sample);
         Residual residual = measure_residual(frame, sweep.points, goal.jobs);
         correct_paths(frame, residual, sweep.points, sweep.ids, sample, credible * goal.tolerance, window.paths);
-        if (round == rounds) break;
+        if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);
         const size_t born = bear_tracks(window, sample, residual, sweep.points, goal);
-        if (born * 100 <= sweep.points.size()) break;
+        last = born * enough <= sweep.points.size() || round + 1 == most_rounds;
+        if (born == 0) break;
     }
 }
 
@@ -174,7 +178,7 @@ void grow_tracks(Window& window, const std::vector<Path>& survivors, const Windo
             carry_on(window, s, goal.jobs);
             thin_out(window, s, goal);
         }
-        if (s > 0 || survivors.empty()) fill_frame(window, s, window.opens_clip && s == 0 ? first_rounds : later_rounds, goal);
+        if (s > 0 || survivors.empty()) fill_frame(window, s, goal);
     }
     std::erase_if(window.paths, [](const Path& path) { return path.at.empty(); });
 }

@@ -27,7 +27,7 @@ constexpr uint32_t lanes = 32;
 // wide patches of a calm far side would speak for fine surface nearby.
 constexpr float flatten = 3;
 // Where the nearest point is farther (in u²) than `trusted`, the winding number may overrule the blend if it is sure;
-// farther than `core` it decides alone.
+// farther than `core` it need not even disagree.
 constexpr float core = 0.3f, trusted = 0.12f;
 constexpr float sure = 0.2f;            // of the winding number, from 0 or 1
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
@@ -199,10 +199,12 @@ void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& n
     if (f.point_count) winding_numbers(f, p, winding);
     for (uint32_t l = 0; l < n; ++l) {
         if (!nearest.doubtful(l)) continue;
-        const bool overrule = value[l] < 0 ? winding[l] < sure : winding[l] > 1 - sure;
-        if (!nearest.far(l) && !overrule) continue;
+        // Between wide patches the discs are too coarse to ask: then the blend stands, if there is one.
+        const bool certain = winding[l] < sure || winding[l] > 1 - sure, inside = winding[l] > 0.5f;
+        const bool overrule = certain && (nearest.far(l) || inside != (value[l] < 0));
+        if (sign[l] != 0 && !overrule) continue;
         const float distance = std::fabs(nearest.h[l]);
-        value[l] = winding[l] > 0.5f ? -std::min(distance, f.grid_cell) : distance;
+        value[l] = inside ? -std::min(distance, f.grid_cell) : distance;
         sign[l] = 0;
     }
 }
@@ -261,7 +263,7 @@ void blend(const Field& f, const uint32_t* candidates, uint32_t points, const fl
         const float b = has_b ? sums.sum_b[l] / sums.weight_b[l] : a;
         const bool use_b = !has_a || (sums.side[l] < 0 ? b > a : b < a);
         k.value[l] = use_b ? b : a;
-        k.sign[l] = k.nearest.far(l) ? 0.f : use_b ? -1.f : 1.f;
+        k.sign[l] = !has_a && !has_b ? 0.f : use_b ? -1.f : 1.f;
     }
     decide_far(f, k.p, n, k.nearest, k.value, k.sign);
 }
