@@ -28,8 +28,8 @@ constexpr uint32_t lanes = 32;
 constexpr float flatten = 3;
 // Where the nearest point is farther (in u²) than `trusted`, the winding number may overrule the blend if it is sure;
 // farther than `core` it need not even disagree.
-constexpr float core = 0.3f, trusted = 0.12f;
-constexpr float sure = 0.2f;            // of the winding number, from 0 or 1
+constexpr float core = 0.3f, trusted = 0.08f;
+constexpr float sure = 0.2f, likely = 0.35f;  // of the winding number, from 0 or 1: to overrule within and beyond core
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
 constexpr float agreeing = 0.7f;        // above this: full weight in A; between, patches of another face fade out
 constexpr float gate_scale = 1 / (agreeing - opposed);
@@ -200,7 +200,8 @@ void decide_far(const Field& f, const Positions& p, uint32_t n, const Nearest& n
     for (uint32_t l = 0; l < n; ++l) {
         if (!nearest.doubtful(l)) continue;
         // Between wide patches the discs are too coarse to ask: then the blend stands, if there is one.
-        const bool certain = winding[l] < sure || winding[l] > 1 - sure, inside = winding[l] > 0.5f;
+        const float doubt = nearest.far(l) ? likely : sure;
+        const bool certain = winding[l] < doubt || winding[l] > 1 - doubt, inside = winding[l] > 0.5f;
         const bool overrule = certain && (nearest.far(l) || inside != (value[l] < 0));
         if (sign[l] != 0 && !overrule) continue;
         const float distance = std::fabs(nearest.h[l]);
