@@ -19,6 +19,7 @@ constexpr uint32_t support_neighbour = 6;  // R = support_scale · distance to t
 constexpr float support_scale = 1.4f;
 constexpr float same_side = 0.3f;          // least n·n of a row
 constexpr float most_alone = 1.8f;         // support relative to that of the points of either side
+constexpr float most_apart = 4.5;           // likewise to the distance of the 2nd nearest point
 constexpr float most_area = 0.3f;           // of the squared distance to the 6th neighbour of either side, over π
 constexpr float most_bend = 0.9f;          // |curvature|·R at most: a patch never curls over
 constexpr float ridge = 1e-3f;             // of the normalised normal equations: minimal norm when degenerate
@@ -235,7 +236,9 @@ void fit_patch(Field& f, uint32_t i) {
     const Neighbours neighbours = find_neighbours(f, i);
     // A lone point of its side must not reach across its whole surroundings.
     const float around = std::sqrt(neighbours.any[support_neighbour - 1]);
-    const float spacing = std::min(spacing_of(f, neighbours), most_alone * around);
+    // And a droplet of a few points must not take its measure from the next droplet.
+    const float beside = std::sqrt(neighbours.any[1]);
+    const float spacing = std::min({spacing_of(f, neighbours), most_alone * around, most_apart * beside});
     const float support = spacing > 1e-4f * f.grid_cell ? support_scale * spacing : f.grid_cell;
     f.support[i] = support;
     // k neighbours within d: on a surface one point in π d² / (k + ½). Far more even than a rule on the 6th; but the
