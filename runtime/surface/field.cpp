@@ -4,7 +4,8 @@
 // Departures from the paper, each measured on real liquids:
 //   rows      weighted by distance, only neighbours that face the same way
 //   support   follows the local spacing (distance to the 6th neighbour of the same side)
-//   curvature clamped, so that a degenerate neighbourhood gives a flat patch and never a spike
+//   curvature clamped, so that a degenerate neighbourhood gives a flat patch and never a spike; at .9 of a radius
+//             (at .45 honest fillets and drops cost 6 % more bytes at equal error)
 #include "surface/field.h"
 
 #include <algorithm>
@@ -19,7 +20,7 @@ constexpr uint32_t support_neighbour = 6;  // R = support_scale · distance to t
 constexpr float support_scale = 1.4f;
 constexpr float same_side = 0.3f;          // least n·n of a row
 constexpr float most_alone = 1.8f;         // support relative to that of the points of either side
-constexpr float most_apart = 4.5;           // likewise to the distance of the 2nd nearest point
+constexpr float most_apart = 4.5;  // likewise to the distance of the 2nd nearest point
 constexpr float most_area = 0.3f;           // of the squared distance to the 6th neighbour of either side, over π
 constexpr float most_bend = 0.9f;          // |curvature|·R at most: a patch never curls over
 constexpr float ridge = 1e-3f;             // of the normalised normal equations: minimal norm when degenerate

@@ -5,6 +5,10 @@
 // cluster is blended on its own; where both have weight the liquid between them is thin (the clusters face
 // away from each other: intersection, max) or the air is (they face each other: union, min). Plain blending
 // is 5–20 times worse where the thickness is below 1.5 point spacings.
+//
+// Away from points the winding number of all points gives the sign. Tried on a splash (p99 of the worst frame, % of
+// the diagonal): round supports and the nearest plane's sign 10.8; flattened supports 0.28 with stray scraps of 4 %;
+// with patches of other faces fading out and the winding number 0.28 without scraps.
 #include <algorithm>
 #include <cmath>
 
