@@ -25,7 +25,6 @@ constexpr double first_tolerance = 1.15;
 struct Survey {
     glm::vec3 lower{0}, upper{0};
     float edge = 0;
-    size_t most_triangles = 0;
     double triangles = 0, vertices = 0;
     double diagonal() const { return glm::distance(lower, upper); }
 };
@@ -53,7 +52,6 @@ Survey survey(const SequenceReader& reader, int jobs, const std::function<void(u
         if (f.triangles == 0) continue;
         lower = glm::min(lower, f.lower), upper = glm::max(upper, f.upper);
         edges.push_back(f.edge);
-        result.most_triangles = std::max(result.most_triangles, f.triangles);
         result.triangles += double(f.triangles), result.vertices += double(f.vertices);
     }
     if (edges.empty()) {
@@ -77,7 +75,6 @@ WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
 
 struct Account {
     ChunkBits bits;
-    double residual_p99 = 0;
     uint64_t tracks = 0, point_frames = 0;
     std::vector<double> layer_bytes;
 };
@@ -154,7 +151,6 @@ void write_window(AssetWriter& writer, const Window& window, const CodedWindow& 
         add(account.bits, chunk.encoded.bits);
         account.layer_bytes[chunk.layer] += double(chunk.encoded.bytes.size());
     }
-    account.residual_p99 = std::max(account.residual_p99, coded.residual_p99);
     account.tracks += window.paths.size();
     for (const Path& path : window.paths) account.point_frames += uint64_t(path.death - path.birth + 1);
     writer.add_window(uint32_t(window.first), uint32_t(window.samples()), block_count, std::move(chunks));

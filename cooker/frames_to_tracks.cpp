@@ -185,7 +185,6 @@ void grow_tracks(Window& window, const std::vector<Path>& survivors, const Windo
 
 CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables) {
     CodedWindow coded;
-    std::vector<double> p99(window.frames.size());
     for (int round = 0;; ++round) {
         coded.tracks.resize(window.paths.size()), coded.decoded.resize(window.paths.size());
         parallel_for(window.paths.size(), goal.jobs, [&](size_t i) {
@@ -196,18 +195,15 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
                                              });
             coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
         });
+        if (round == coding_rounds) return coded;
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
             const SurfaceFrame& frame = *window.frames[s];
             std::vector<uint32_t> ids;
             const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
             const Residual residual = measure_residual(frame, points);
-            p99[s] = residual_percentile(frame, residual, 0.99);
-            if (round < coding_rounds) correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
+            correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
         });
-        if (round == coding_rounds) break;
     }
-    for (double value : p99) coded.residual_p99 += value / double(p99.size());
-    return coded;
 }
 
 std::vector<Path> survivors_of(const Window& window) {

@@ -17,7 +17,6 @@ struct WindowGoal {
 struct CodedWindow {
     std::vector<QuantisedTrack> tracks;   ///< parallel to Window::paths
     std::vector<TrackSamples> decoded;    ///< what each decodes to
-    double residual_p99 = 0;              ///< metres: largest frame percentile is not hidden: mean over frames
 };
 
 /// Fills window.paths: survivors of the window before (points on its last frame) are carried on, then births and
