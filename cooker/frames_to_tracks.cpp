@@ -151,7 +151,7 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
 TrackSamples samples_of(const Window& window, const Path& path) {
     TrackSamples samples;
     samples.birth = uint8_t(path.birth), samples.death = uint8_t(path.death);
-    const bool enters = path.birth == 0 && (path.continues || window.opens_clip);
+    const bool enters = path.birth == 0 && (path.continues || window.opens_span);
     const bool leaves = path.death == window.samples() - 1;
     samples.flags = uint8_t((enters ? 0 : format::track_born) | (leaves ? 0 : format::track_dies));
     for (int s = path.birth; s <= path.death; ++s) {

@@ -39,7 +39,7 @@ struct Path {
 
 struct Window {
     int first = 0;                       ///< frame index of sample 0
-    bool opens_clip = false, ends_clip = false;
+    bool opens_span = false;             ///< nothing comes from before: the surface stands there from the start
     std::vector<std::shared_ptr<const SurfaceFrame>> frames;
     std::vector<double> seconds;
     std::vector<Path> paths;
