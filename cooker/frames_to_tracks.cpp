@@ -215,6 +215,7 @@ std::vector<Path> survivors_of(const Window& window) {
         if (path.death != window.samples() - 1) continue;
         Path last;
         last.radius = path.radius, last.continues = true, last.surplus = path.surplus;
+        last.age = path.age + path.death - path.birth;
         last.at = {path.at.back()}, last.correction = {path.correction.back()}, last.tilt = {path.tilt.back()};
         survivors.push_back(std::move(last));
     }

@@ -9,7 +9,7 @@
 namespace rill::cooker {
 
 /// Measured, see README.md "Spans": what starting afresh costs.
-inline constexpr uint32_t windows_per_span = 2;
+inline constexpr uint32_t windows_per_span = 4;
 
 struct SpanPlan {
     uint32_t frames = 1, window = 24;  ///< frames a window spans (it touches one more)
