@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "surface/field_kernels.h"
+#include "surface/field_rules.h"
 
 namespace rill::surface {
 namespace {
@@ -34,6 +35,7 @@ uint32_t grid_capacity(uint32_t points) { return 8 * points + 64; }
 
 /// Clusters are blocks of so many grid cells a side; a block of many points makes several.
 constexpr uint32_t cluster_cells = 4, cluster_size = 32;
+constexpr uint32_t group_cells = 4 * cluster_cells;  // groups of clusters likewise
 uint32_t cluster_capacity(uint32_t points) { return points; }
 
 struct Carver {
@@ -60,6 +62,7 @@ void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
     for (float*& array : field.inverse) array = carver.take<float>(drops);
     field.cell_start = carver.take<uint32_t>(grid_capacity(points) + 1);
     field.clusters = carver.take<Cluster>(cluster_capacity(points));
+    field.groups = carver.take<Cluster>(cluster_capacity(points));
     field.cluster_member = carver.take<uint32_t>(points);
 }
 
@@ -291,21 +294,44 @@ void fit_patch(Field& f, uint32_t i) {
                     f.steep[i], f.activity[i], 1 / f.activity[i], 0};
 }
 
-void close_cluster(Field& f, Cluster& k) {
+struct Disc {
+    float centre[3], area[3], size, radius;  ///< size: of all areas, whatever their direction
+};
+
+/// One disc in place of `count`. Their areas give the centre; the ball holds them all.
+template <typename Of>
+Cluster joined(uint32_t first, uint32_t last, Of&& disc) {
+    Cluster k{};
+    k.first = first, k.last = last;
     float total = 0, furthest = 0;
-    for (uint32_t m = k.first; m < k.last; ++m) {
-        const uint32_t j = f.cluster_member[m];
-        const float area = f.area[j], p[3] = {f.x[j], f.y[j], f.z[j]}, n[3] = {f.nx[j], f.ny[j], f.nz[j]};
-        for (int a = 0; a < 3; ++a) k.centre[a] += area * p[a], k.area[a] += area * n[a];
-        total += area;
+    for (uint32_t m = first; m < last; ++m) {
+        const Disc d = disc(m);
+        for (int a = 0; a < 3; ++a) k.centre[a] += d.size * d.centre[a], k.area[a] += d.area[a];
+        total += d.size;
     }
     for (float& x : k.centre) x /= std::max(total, 1e-30f);
-    for (uint32_t m = k.first; m < k.last; ++m) {
-        const uint32_t j = f.cluster_member[m];
-        const float d[3] = {f.x[j] - k.centre[0], f.y[j] - k.centre[1], f.z[j] - k.centre[2]};
-        furthest = std::max(furthest, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (uint32_t m = first; m < last; ++m) {
+        const Disc d = disc(m);
+        const float r[3] = {d.centre[0] - k.centre[0], d.centre[1] - k.centre[1], d.centre[2] - k.centre[2]};
+        furthest = std::max(furthest, std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + d.radius);
     }
-    k.radius = std::sqrt(furthest);
+    k.limit = from_afar * furthest * furthest;
+    return k;
+}
+Cluster join_points(const Field& f, uint32_t first, uint32_t last) {
+    return joined(first, last, [&](uint32_t m) {
+        const uint32_t j = f.cluster_member[m];
+        const float area = f.area[j];
+        return Disc{{f.x[j], f.y[j], f.z[j]}, {area * f.nx[j], area * f.ny[j], area * f.nz[j]}, area, 0};
+    });
+}
+Cluster join_clusters(const Field& f, uint32_t first, uint32_t last) {
+    return joined(first, last, [&](uint32_t m) {
+        const Cluster& k = f.clusters[m];
+        const float size = std::sqrt(k.area[0] * k.area[0] + k.area[1] * k.area[1] + k.area[2] * k.area[2]);
+        return Disc{{k.centre[0], k.centre[1], k.centre[2]}, {k.area[0], k.area[1], k.area[2]}, size,
+                    std::sqrt(k.limit / from_afar)};
+    });
 }
 
 /// Points of the grid cells of one block, row by row.
@@ -320,19 +346,29 @@ uint32_t list_block(Field& f, const uint32_t block[3], uint32_t at) {
     return at;
 }
 
+/// Work(corner) for the blocks of `step` grid cells a side in [from, to).
+template <typename Work>
+void for_blocks(const uint32_t from[3], const uint32_t to[3], uint32_t step, Work&& work) {
+    uint32_t block[3];
+    for (block[2] = from[2]; block[2] < to[2]; block[2] += step)
+        for (block[1] = from[1]; block[1] < to[1]; block[1] += step)
+            for (block[0] = from[0]; block[0] < to[0]; block[0] += step) work(block);
+}
+
 void build_clusters(Field& f) {
-    uint32_t listed = 0, block[3];
-    for (block[2] = 0; block[2] < f.grid_size[2]; block[2] += cluster_cells)
-        for (block[1] = 0; block[1] < f.grid_size[1]; block[1] += cluster_cells)
-            for (block[0] = 0; block[0] < f.grid_size[0]; block[0] += cluster_cells) {
-                const uint32_t end = list_block(f, block, listed);
-                for (; listed < end; listed = std::min(listed + cluster_size, end)) {
-                    Cluster& k = f.clusters[f.cluster_count++];
-                    k = {};
-                    k.first = listed, k.last = std::min(listed + cluster_size, end);
-                    close_cluster(f, k);
-                }
-            }
+    uint32_t listed = 0;
+    const uint32_t origin[3] = {0, 0, 0};
+    for_blocks(origin, f.grid_size, group_cells, [&](const uint32_t group[3]) {
+        const uint32_t first = f.cluster_count;
+        uint32_t to[3];
+        for (int a = 0; a < 3; ++a) to[a] = std::min(group[a] + group_cells, f.grid_size[a]);
+        for_blocks(group, to, cluster_cells, [&](const uint32_t block[3]) {
+            const uint32_t end = list_block(f, block, listed);
+            for (; listed < end; listed = std::min(listed + cluster_size, end))
+                f.clusters[f.cluster_count++] = join_points(f, listed, std::min(listed + cluster_size, end));
+        });
+        if (f.cluster_count > first) f.groups[f.group_count++] = join_clusters(f, first, f.cluster_count);
+    });
 }
 
 }  // namespace
@@ -340,7 +376,7 @@ void build_clusters(Field& f) {
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
     return aligned(points * sizeof(Patch)) + 13 * aligned((points + lanes) * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
            15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t)) +
-           aligned(cluster_capacity(points) * sizeof(Cluster));
+           2 * aligned(cluster_capacity(points) * sizeof(Cluster));
 }
 
 void begin_field(Field& field, void* memory, const format::PointSet& points,
