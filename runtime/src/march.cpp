@@ -11,7 +11,7 @@
 namespace rill {
 namespace {
 
-constexpr float disc_share = 0.4f;  // of a patch's support: discs of neighbours just overlap
+constexpr float disc_share = 0.25f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
 int32_t tile_at(const Mesher& m, float x) {
@@ -76,18 +76,20 @@ void seed_drop(Mesher& m, uint32_t i) {
 void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const surface::Field& f = *m.input.field;
     const surface::Patch& q = f.patches[i];
-    const float cells = 1 / m.input.cell_size, radius = disc_share * f.support[i] * cells + 0.5f;
+    const float cells = tile_cells * m.inverse_tile, radius = disc_share * f.support[i] * cells + 0.5f;
     const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
     float at[3];  // in cells of this tile
+    for (int a = 0; a < 3; ++a) {
+        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
+        if (!(at[a] > -radius && at[a] < tile_cells + radius)) return;
+    }
     int from[3], to[3], home[3];
     bool is_home = true;
     for (int a = 0; a < 3; ++a) {
-        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
-        from[a] = int(std::clamp(std::floor(at[a] - radius), 0.f, 8.f));
-        to[a] = int(std::clamp(std::floor(at[a] + radius), -1.f, 7.f));
-        if (from[a] > to[a]) return;
+        from[a] = std::max(int(at[a] - radius + tile_cells) - tile_cells, 0);  // rounds down from −8 up
+        to[a] = std::min(int(at[a] + radius), tile_cells - 1);
         is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
-        home[a] = int(std::clamp(at[a], 0.f, 7.f));
+        home[a] = std::clamp(int(at[a]), 0, tile_cells - 1);
     }
     if (is_home) want(tile, home);
     const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)

@@ -167,6 +167,8 @@ struct Neighbours {
     }
     uint32_t id[most_neighbours];
     float d2[most_neighbours];
+    /// Farther ones are of no interest.
+    float furthest() const { return count == most_neighbours ? std::max(d2[count - 1], any[support_neighbour - 1]) : 1e30f; }
     void offer(uint32_t i, float distance2) {
         if (count == most_neighbours && distance2 >= d2[count - 1]) return;
         uint32_t at = count < most_neighbours ? count++ : count - 1;
@@ -175,35 +177,37 @@ struct Neighbours {
     }
 };
 
-/// The nearest points that face the same way as point i, ring by ring through the grid.
+/// The nearest points that face the same way as point i: those of a box of grid cells around its own, which grows
+/// until it holds the ball that they span.
 Neighbours find_neighbours(const Field& f, uint32_t i) {
-    Neighbours found;
-    const float p[3] = {f.x[i], f.y[i], f.z[i]};
+    constexpr int first_reach = 2, last_reach = 8;
+    const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
     int at[3];
     for (int a = 0; a < 3; ++a) at[a] = int(cell_of(p[a], f.grid_origin[a], f.grid_cell, f.grid_size[a]));
-    const int last_ring = int(std::max({f.grid_size[0], f.grid_size[1], f.grid_size[2]}));
-    for (int ring = 0; ring <= std::min(last_ring, 8); ++ring) {
-        // All of ring r lies beyond (r − 1) cells.
-        const float beyond = float(std::max(0, ring - 1)) * f.grid_cell;
-        if (found.count == most_neighbours && found.d2[found.count - 1] < beyond * beyond) break;
-        for (int z = std::max(0, at[2] - ring); z <= std::min(int(f.grid_size[2]) - 1, at[2] + ring); ++z)
-            for (int y = std::max(0, at[1] - ring); y <= std::min(int(f.grid_size[1]) - 1, at[1] + ring); ++y) {
-                const bool face = std::abs(z - at[2]) == ring || std::abs(y - at[1]) == ring;
-                const int step = face ? 1 : std::max(1, 2 * ring);
-                for (int x = at[0] - ring; x <= at[0] + ring; x += step) {
-                    if (x < 0 || x >= int(f.grid_size[0])) continue;
-                    const uint32_t cell = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0] + uint32_t(x);
-                    for (uint32_t j = f.cell_start[cell]; j < f.cell_start[cell + 1]; ++j) {
-                        if (j == i) continue;
-                        const float dx = f.x[j] - p[0], dy = f.y[j] - p[1], dz = f.z[j] - p[2];
-                        const float d2 = dx * dx + dy * dy + dz * dz;
-                        found.offer_any(d2);
-                        if (f.nx[j] * f.nx[i] + f.ny[j] * f.ny[i] + f.nz[j] * f.nz[i] >= same_side) found.offer(j, d2);
-                    }
+    for (int reach = first_reach;; ++reach) {
+        Neighbours found;
+        int from[3], to[3];
+        bool whole = true;
+        for (int a = 0; a < 3; ++a) {
+            from[a] = std::max(0, at[a] - reach), to[a] = std::min(int(f.grid_size[a]) - 1, at[a] + reach);
+            whole = whole && to[a] - from[a] + 1 == int(f.grid_size[a]);
+        }
+        for (int z = from[2]; z <= to[2]; ++z)
+            for (int y = from[1]; y <= to[1]; ++y) {
+                const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
+                const uint32_t last = f.cell_start[row + uint32_t(to[0]) + 1];
+                for (uint32_t j = f.cell_start[row + uint32_t(from[0])]; j < last; ++j) {
+                    const float dx = f.x[j] - p[0], dy = f.y[j] - p[1], dz = f.z[j] - p[2];
+                    const float d2 = dx * dx + dy * dy + dz * dz;
+                    if (d2 >= found.furthest() || j == i) continue;
+                    found.offer_any(d2);
+                    if (f.nx[j] * n[0] + f.ny[j] * n[1] + f.nz[j] * n[2] >= same_side) found.offer(j, d2);
                 }
             }
+        const float ball = float(reach) * f.grid_cell;  // the own cell lies between
+        const bool complete = found.count == most_neighbours && found.d2[found.count - 1] <= ball * ball;
+        if (complete || whole || reach == last_reach) return found;
     }
-    return found;
 }
 
 /// Distance within which `support_neighbour` neighbours' worth of activity lies; interpolated, so that it

@@ -65,12 +65,13 @@ RILL_INLINE void find_nearest(const Field& f, const uint32_t* list, uint32_t cou
     }
 }
 
-/// Which side of A the points of B lie on: below, the liquid between them is thin; above, the air is.
-RILL_INLINE void side_of(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const float* height,
-                         float* side) {
-    for (uint32_t l = 0; l < lanes; ++l) side[l] = 0;
+/// Where both clusters have weight: the side of A that the points of B lie on tells whether the liquid between them is
+/// thin (below) or the air is.
+RILL_INLINE void choose_side(const Field& f, const uint32_t* list, uint32_t count, const float* height,
+                             const float* weight_b, const float* sum_b, Batch& b) {
+    alignas(64) float side[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
-        const Patch p = f.patches[list[c]];
+        const Patch& p = f.patches[list[c]];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
             const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
@@ -80,10 +81,19 @@ RILL_INLINE void side_of(const Field& f, const uint32_t* list, uint32_t count, c
             side[l] += weight_b_of(u2, weight_of(u2, p.activity), agree) * (height[l] - along);
         }
     }
+    for (uint32_t l = 0; l < lanes; ++l) {
+        const float some = weight_b[l] > 0 ? weight_b[l] : 1.f, value = sum_b[l] / some, a = b.value[l];
+        // Thin liquid: intersection, max; thin air: union, min.
+        const float gain = side[l] < 0 ? value - a : a - value, better = b.sign[l] != 0 ? gain : 1.f;
+        const float take = weight_b[l] > 0 ? better : 0.f;
+        b.value[l] = take > 0 ? value : a, b.weight[l] = take > 0 ? weight_b[l] : b.weight[l];
+        b.sign[l] = take > 0 ? -1.f : b.sign[l];
+        b.doubt[l] = take > 0 ? int32_t(b.u2[l] > trusted) : b.doubt[l];
+    }
 }
 
 RILL_INLINE void blend(const Field& f, const uint32_t* list, uint32_t count, Batch& b) {
-    alignas(64) float height[lanes], side[lanes];
+    alignas(64) float height[lanes];
     alignas(64) float weight_a[lanes] = {}, sum_a[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {};
     alignas(64) float voters[lanes] = {}, inside[lanes] = {};  // of A: how many, and the weight of those who say liquid
     find_nearest(f, list, count, b, height);
@@ -103,21 +113,15 @@ RILL_INLINE void blend(const Field& f, const uint32_t* list, uint32_t count, Bat
     }
     int32_t any_b = 0;
     for (uint32_t l = 0; l < lanes; ++l) {
-        const bool has = weight_a[l] > 0;
-        b.value[l] = has ? sum_a[l] / weight_a[l] : unsupported;
-        b.weight[l] = weight_a[l], b.sign[l] = has ? 1.f : 0.f;
+        const float weight = weight_a[l], some = weight > 0 ? weight : 1.f, value = sum_a[l] / some;
+        b.value[l] = weight > 0 ? value : unsupported;
+        b.weight[l] = weight, b.sign[l] = weight > 0 ? 1.f : 0.f;
+        const float against = value < 0 ? weight - inside[l] : inside[l];
+        const int32_t agreed = (voters[l] >= enough_voters) & (against <= few_against * weight);
+        b.doubt[l] = (b.u2[l] > trusted) & ~agreed;
         any_b |= weight_b[l] > 0;
-        const float against = b.value[l] < 0 ? weight_a[l] - inside[l] : inside[l];
-        b.vouched[l] = has && voters[l] >= enough_voters && against <= few_against * weight_a[l];
     }
-    if (any_b) side_of(f, list, count, b, height, side);
-    for (uint32_t l = 0; any_b && l < lanes; ++l) {
-        if (!(weight_b[l] > 0)) continue;
-        const float value = sum_b[l] / weight_b[l];
-        // Thin liquid: intersection, max; thin air: union, min.
-        if (b.sign[l] != 0 && !(side[l] < 0 ? value > b.value[l] : value < b.value[l])) continue;
-        b.value[l] = value, b.weight[l] = weight_b[l], b.sign[l] = -1, b.vouched[l] = false;
-    }
+    if (any_b) choose_side(f, list, count, height, weight_b, sum_b, b);
     for (uint32_t l = 0; l < lanes; ++l) b.u2[l] = b.sign[l] == 0 ? unsupported : b.u2[l];
 }
 
