@@ -167,8 +167,6 @@ struct Neighbours {
     }
     uint32_t id[most_neighbours];
     float d2[most_neighbours];
-    /// Farther ones are of no interest.
-    float furthest() const { return count == most_neighbours ? std::max(d2[count - 1], any[support_neighbour - 1]) : 1e30f; }
     void offer(uint32_t i, float distance2) {
         if (count == most_neighbours && distance2 >= d2[count - 1]) return;
         uint32_t at = count < most_neighbours ? count++ : count - 1;
@@ -177,36 +175,102 @@ struct Neighbours {
     }
 };
 
+/// The points of a box of grid cells, side by side: points of one cell share them.
+struct Surroundings {
+    static constexpr uint32_t capacity = 256;
+    uint32_t count = 0, id[capacity];
+    alignas(64) float x[capacity], y[capacity], z[capacity], nx[capacity], ny[capacity], nz[capacity];
+    int32_t cell[3] = {-1, -1, -1}, reach = 0;
+    bool whole, complete;  // the box holds the grid; the box's points fit
+
+    void begin(const Field& f, const int32_t at[3], int32_t far) {
+        std::memcpy(cell, at, sizeof(cell));
+        reach = far, count = 0, complete = true;
+        for_rows(f, [&](uint32_t first, uint32_t last) { complete = complete && add(f, first, last); });
+    }
+    /// Work(first, last): sorted points, row by row of the box.
+    template <typename Work>
+    void for_rows(const Field& f, Work&& work) {
+        int32_t from[3], to[3];
+        whole = true;
+        for (int a = 0; a < 3; ++a) {
+            from[a] = std::max(0, cell[a] - reach), to[a] = std::min(int32_t(f.grid_size[a]) - 1, cell[a] + reach);
+            whole = whole && to[a] - from[a] + 1 == int32_t(f.grid_size[a]);
+        }
+        for (int32_t z = from[2]; z <= to[2]; ++z)
+            for (int32_t y = from[1]; y <= to[1]; ++y) {
+                const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
+                const uint32_t first = f.cell_start[row + uint32_t(from[0])], last = f.cell_start[row + uint32_t(to[0]) + 1];
+                if (first < last) work(first, last);
+            }
+    }
+    bool add(const Field& f, uint32_t first, uint32_t last) {
+        if (last - first > capacity - count) return false;
+        for (uint32_t j = first; j < last; ++j, ++count) {
+            x[count] = f.x[j], y[count] = f.y[j], z[count] = f.z[j];
+            nx[count] = f.nx[j], ny[count] = f.ny[j], nz[count] = f.nz[j], id[count] = j;
+        }
+        return true;
+    }
+    /// Those within the ball of squared radius `bound`.
+    void offer_all(const Field& f, uint32_t i, float bound, Neighbours& found) {
+        const float px = f.x[i], py = f.y[i], pz = f.z[i], px_n = f.nx[i], py_n = f.ny[i], pz_n = f.nz[i];
+        for (uint32_t c = 0; c < count; ++c) {
+            const float dx = x[c] - px, dy = y[c] - py, dz = z[c] - pz;
+            d2[c] = dx * dx + dy * dy + dz * dz;
+            agree[c] = nx[c] * px_n + ny[c] * py_n + nz[c] * pz_n;
+        }
+        uint32_t close = 0;
+        for (uint32_t c = 0; c < count; ++c) {  // no branch: who is close is past foretelling
+            place[close] = c;
+            close += (d2[c] < bound) & (id[c] != i);
+        }
+        for (uint32_t k = 0; k < close; ++k) {
+            const uint32_t c = place[k];
+            found.offer_any(d2[c]);
+            if (agree[c] >= same_side) found.offer(id[c], d2[c]);
+        }
+    }
+    float d2[capacity], agree[capacity];
+    uint32_t place[capacity + 1];
+    float guess = 1e30f;  ///< of the squared radius that holds all neighbours, from the last point; changes no result
+};
+
+Neighbours offer_box(const Field& f, uint32_t i, float bound, Surroundings& around) {
+    Neighbours found;
+    if (around.complete) {
+        around.offer_all(f, i, bound, found);
+        return found;
+    }
+    around.count = 0;  // a crowd: part by part
+    around.for_rows(f, [&](uint32_t first, uint32_t last) {
+        for (uint32_t some; first < last; first += some) {
+            some = std::min(last - first, Surroundings::capacity);
+            if (around.add(f, first, first + some)) continue;
+            around.offer_all(f, i, bound, found);
+            around.count = some = 0;
+        }
+    });
+    around.offer_all(f, i, bound, found);
+    return found;
+}
+
 /// The nearest points that face the same way as point i: those of a box of grid cells around its own, which grows
 /// until it holds the ball that they span.
-Neighbours find_neighbours(const Field& f, uint32_t i) {
-    constexpr int first_reach = 2, last_reach = 8;
-    const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
-    int at[3];
-    for (int a = 0; a < 3; ++a) at[a] = int(cell_of(p[a], f.grid_origin[a], f.grid_cell, f.grid_size[a]));
-    for (int reach = first_reach;; ++reach) {
-        Neighbours found;
-        int from[3], to[3];
-        bool whole = true;
-        for (int a = 0; a < 3; ++a) {
-            from[a] = std::max(0, at[a] - reach), to[a] = std::min(int(f.grid_size[a]) - 1, at[a] + reach);
-            whole = whole && to[a] - from[a] + 1 == int(f.grid_size[a]);
-        }
-        for (int z = from[2]; z <= to[2]; ++z)
-            for (int y = from[1]; y <= to[1]; ++y) {
-                const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
-                const uint32_t last = f.cell_start[row + uint32_t(to[0]) + 1];
-                for (uint32_t j = f.cell_start[row + uint32_t(from[0])]; j < last; ++j) {
-                    const float dx = f.x[j] - p[0], dy = f.y[j] - p[1], dz = f.z[j] - p[2];
-                    const float d2 = dx * dx + dy * dy + dz * dz;
-                    if (d2 >= found.furthest() || j == i) continue;
-                    found.offer_any(d2);
-                    if (f.nx[j] * n[0] + f.ny[j] * n[1] + f.nz[j] * n[2] >= same_side) found.offer(j, d2);
-                }
-            }
-        const float ball = float(reach) * f.grid_cell;  // the own cell lies between
-        const bool complete = found.count == most_neighbours && found.d2[found.count - 1] <= ball * ball;
-        if (complete || whole || reach == last_reach) return found;
+Neighbours find_neighbours(const Field& f, uint32_t i, Surroundings& around) {
+    constexpr int32_t first_reach = 2, last_reach = 8;
+    const float p[3] = {f.x[i], f.y[i], f.z[i]};
+    int32_t at[3];
+    for (int a = 0; a < 3; ++a) at[a] = int32_t(cell_of(p[a], f.grid_origin[a], f.grid_cell, f.grid_size[a]));
+    // A box that had to grow for another point of the cell serves as well: the nearest are the nearest.
+    if (std::memcmp(at, around.cell, sizeof(at)) != 0) around.begin(f, at, first_reach);
+    for (;; around.begin(f, at, around.reach + 1)) {
+        Neighbours found = offer_box(f, i, around.guess, around);
+        if (found.count < most_neighbours) found = offer_box(f, i, 1e30f, around);
+        const float ball = float(around.reach) * f.grid_cell;  // the own cell lies between
+        const bool full = found.count == most_neighbours, enough = full && found.d2[found.count - 1] <= ball * ball;
+        if (full) around.guess = 2 * found.d2[found.count - 1];
+        if (enough || around.whole || around.reach >= last_reach) return found;
     }
 }
 
@@ -245,8 +309,8 @@ bool solve3(const float m[6], const float r[3], float out[3]) {
     return true;
 }
 
-void fit_patch(Field& f, uint32_t i) {
-    const Neighbours neighbours = find_neighbours(f, i);
+void fit_patch(Field& f, uint32_t i, Surroundings& around_it) {
+    const Neighbours neighbours = find_neighbours(f, i, around_it);
     // A lone point of its side must not reach across its whole surroundings.
     const float around = std::sqrt(neighbours.any[support_neighbour - 1]);
     // And a droplet of a few points must not take its measure from the next droplet.
@@ -394,7 +458,8 @@ void begin_field(Field& field, void* memory, const format::PointSet& points,
 }
 
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
-    for (uint32_t i = first; i < last; ++i) fit_patch(field, i);
+    Surroundings around;
+    for (uint32_t i = first; i < last; ++i) fit_patch(field, i, around);
 }
 
 void finish_field(Field& f) noexcept {
