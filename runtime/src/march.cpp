@@ -128,6 +128,9 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
             need[row] |= corners, need[row + 1] |= corners, need[row + 9] |= corners,
                 need[row + 10] |= corners;
         }
+    float place[3][tile_corners];
+    for (uint32_t a = 0; a < 3; ++a)
+        for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(m, tile, a, k);
     uint32_t n = 0;
     // Octant by octant, so that batches are compact.
     for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -138,11 +141,10 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
                 const uint32_t row = y + 9 * z;
                 uint32_t bits = need[row] & ~uint32_t(tile.known[row]) & (octant & 1 ? 0x1e0 : 0x01f);
                 tile.known[row] |= uint16_t(bits);
-                for (uint32_t x = 0; bits; ++x, bits >>= 1) {
-                    if (!(bits & 1)) continue;
-                    s.x[n] = corner_at(m, tile, 0, x), s.y[n] = corner_at(m, tile, 1, y);
-                    s.z[n] = corner_at(m, tile, 2, z), s.slot[n++] = uint16_t(x + 9 * row);
-                }
+                const float py = place[1][y], pz = place[2][z];
+                for_bits(bits, [&](uint32_t x) {
+                    s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x + 9 * row);
+                });
             }
     }
     s.corners_evaluated += n;

@@ -55,9 +55,9 @@ struct MesherScratch {
     float x[capacity], y[capacity], z[capacity];
     uint16_t slot[capacity];
     float value[capacity], gx[capacity], gy[capacity], gz[capacity], velocity[3 * capacity];
-    // By slot, never reordered: the cell of a vertex, and a normal for where the field has none.
+    // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
-    float guess[3 * capacity];
+    uint8_t patch[capacity];
     uint16_t vertex[cells_per_tile], patches[cells_per_tile];
     uint64_t corners_evaluated;
 };
@@ -102,6 +102,22 @@ struct Mesher {
 };
 
 /// Tiles a task takes: a tile alone is too little work for an engine's job.
+/// Number of the lowest bit set.
+inline uint32_t lowest_bit(uint32_t bits) {
+#if defined(__GNUC__)
+    return uint32_t(__builtin_ctz(bits));
+#else
+    uint32_t n = 0;
+    for (; !(bits & 1); bits >>= 1) ++n;
+    return n;
+#endif
+}
+/// Work(number) for each bit set, lowest first.
+template <typename Work>
+void for_bits(uint32_t bits, Work&& work) {
+    for (; bits; bits &= bits - 1) work(lowest_bit(bits));
+}
+
 inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16;
 constexpr uint32_t tasks_of(uint32_t tiles, uint32_t per_task) { return (tiles + per_task - 1) / per_task; }
 /// Runs work(tile index in the list) for the tiles of one task.
