@@ -414,6 +414,14 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     return report;
 }
 
+void survey(const std::string& input, const CookSettings& settings, const std::function<void(const CookProgress&)>& progress) {
+    check(settings);
+    const auto reader = open_input(input, settings);
+    const uint32_t frames = uint32_t(reader->info().numbers.size());
+    survey_input(*reader, settings.read, settings.survey, known_input(*reader, settings.read, settings.survey, settings.jobs), settings.jobs,
+                 [&](uint32_t done) { progress({done, frames, "surveying"}); });
+}
+
 CookPlan plan_cook(const std::string& input, const std::string& output, const CookSettings& settings) {
     const Job job(input, output, settings);
     CookPlan plan;

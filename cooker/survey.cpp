@@ -136,7 +136,9 @@ json read_settings(const ReadOptions& options) {
     json range = nullptr;
     if (options.step != 0) range = {options.first, options.last, options.step};
     return {{"fps", options.frames_per_second}, {"frames", range}, {"velocity", options.velocity_name},
-            {"velocity_unit", options.velocity_per_frame ? "frame" : "second"}};
+            {"velocity_unit", options.velocity_per_frame ? "frame" : "second"},
+            {"up", options.up == 'y' ? "y" : "z"}, {"handedness", options.handedness == 'l' ? "left" : "right"},
+            {"scale", options.scale > 0 ? options.scale : 1}};
 }
 
 std::string known_input(const SequenceReader& reader, const ReadOptions& options, const std::string& file, int jobs) {
