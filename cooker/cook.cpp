@@ -79,8 +79,19 @@ std::vector<LayerError> layer_errors(const Window& window, const CodedWindow& co
     return errors;
 }
 
+/// Tracks that end here, by how long they lived and why.
+void count_lives(SpanResult& account, const Window& window, bool ends_span) {
+    account.deaths.resize(std::size(death_names));
+    for (const Path& path : window.paths) {
+        if (path.cause == Death::none && !ends_span) continue;
+        const size_t life = size_t(path.age + path.death - path.birth + 1);
+        if (account.lives.size() <= life) account.lives.resize(life + 1);
+        ++account.lives[life], ++account.deaths[size_t(path.cause)];
+    }
+}
+
 void write_window(AssetWriter& writer, uint32_t first_sample, const Window& window, const CodedWindow& coded, const WindowGoal& goal,
-                  uint32_t layers, SpanResult& account) {
+                  uint32_t layers, bool ends_span, SpanResult& account) {
     const std::vector<uint32_t> layer = assign_layers(window, layers);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(window, most_tracks_per_block, block_count);
@@ -108,6 +119,7 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
     }
     account.tracks += window.paths.size();
     for (const Path& path : window.paths) account.point_frames += uint64_t(path.death - path.birth + 1);
+    count_lives(account, window, ends_span);
     writer.add_window(first_sample, uint32_t(window.samples()), block_count, std::move(chunks));
 }
 
@@ -198,12 +210,12 @@ private:
         for (uint32_t first = begin;; first += plan_.window) {
             Window window = load(first, std::min(end, first + plan_.window), border);
             window.opens_span = first == begin;
+            const uint32_t last = first + uint32_t(window.samples()) - 1;
             grow_tracks(window, survivors, goal);
             const CodedWindow coded = code_tracks(window, goal, tables_);
-            write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), result);
+            write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), last == end, result);
             survivors = survivors_of(window);
             border = window.frames.back();
-            const uint32_t last = first + uint32_t(window.samples()) - 1;
             done(last - begin);
             if (last == end) break;
         }

@@ -16,6 +16,8 @@ constexpr int patience = 4;                        // frames a track is surplus 
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float surplus_angle = 0.1f;              // radians
+constexpr float widest = 5;                        // spacing that thinning leaves, in edges: beyond, patches outreach
+                                                   // the liquid's depth and the winding number has too few discs
 
 /// The points of one frame while the sweep stands there.
 struct Sweep {
@@ -85,8 +87,9 @@ void thin_out(Window& window, int sample, const WindowGoal& goal) {
             if (++same == 1) nearest = d;
             if (same == 3) third = d;
         }
-        const bool crowded = nearest < 0.4f * window.frames[size_t(sample)]->edge || (same >= 3 && nearest < 0.2f * third);
-        if (!crowded && (path.surplus < patience || neighbour_gone)) continue;
+        const float edge = window.frames[size_t(sample)]->edge;
+        const bool crowded = nearest < 0.4f * edge || (same >= 3 && nearest < 0.2f * third);
+        if (!crowded && (path.surplus < patience || neighbour_gone || third > widest * edge)) continue;
         gone[k] = true;
         end(path, sample, crowded ? Death::crowded : Death::surplus);
     }
@@ -212,6 +215,7 @@ std::vector<Path> survivors_of(const Window& window) {
         if (path.death != window.samples() - 1) continue;
         Path last;
         last.radius = path.radius, last.continues = true, last.surplus = path.surplus;
+        last.age = path.age + path.death - path.birth;
         last.at = {path.at.back()}, last.correction = {path.correction.back()}, last.tilt = {path.tilt.back()};
         survivors.push_back(std::move(last));
     }

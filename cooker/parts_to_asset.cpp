@@ -5,6 +5,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "pipeline.h"
+
 namespace rill::cooker {
 namespace {
 using nlohmann::json;
@@ -14,8 +16,8 @@ constexpr const char* part_generator = "rill cook, part";
 json to_json(const SpanResult& s) {
     return {{"span", s.span}, {"numbers", s.numbers}, {"seconds", s.seconds},
             {"bits", {s.bits.structure, s.bits.births, s.bits.motion, s.bits.normals, s.bits.drops}},
-            {"layer_bytes", s.layer_bytes}, {"tracks", s.tracks}, {"point_frames", s.point_frames}, {"tolerance", s.tolerance},
-            {"attempts", s.attempts}, {"measured", to_json(s.measured)}};
+            {"layer_bytes", s.layer_bytes}, {"tracks", s.tracks}, {"point_frames", s.point_frames}, {"lives", s.lives}, {"deaths", s.deaths},
+            {"tolerance", s.tolerance}, {"attempts", s.attempts}, {"measured", to_json(s.measured)}};
 }
 
 SpanResult span_from_json(const json& j) {
@@ -25,6 +27,7 @@ SpanResult span_from_json(const json& j) {
     s.bits = {bits.at(0), bits.at(1), bits.at(2), bits.at(3), bits.at(4)};
     s.layer_bytes = j.at("layer_bytes").get<std::vector<double>>();
     s.tracks = j.at("tracks"), s.point_frames = j.at("point_frames"), s.tolerance = j.at("tolerance"), s.attempts = j.at("attempts");
+    s.lives = j.at("lives").get<std::vector<uint64_t>>(), s.deaths = j.at("deaths").get<std::vector<uint64_t>>();
     s.measured = totals_from_json(j.at("measured"));
     return s;
 }
@@ -38,11 +41,33 @@ void add_numbers(json& settings, const std::vector<int>& numbers) {
         }
 }
 
+template <class T>
+void add(std::vector<T>& sum, const std::vector<T>& more) {
+    sum.resize(std::max(sum.size(), more.size()));
+    for (size_t i = 0; i < more.size(); ++i) sum[i] += more[i];
+}
+
+/// Frames that the middle one lives; every life counts once, or once for each of its frames.
+size_t median_life(const std::vector<uint64_t>& lives, bool by_frame) {
+    const auto weight = [&](size_t n) { return double(lives[n]) * (by_frame ? double(n) : 1); };
+    double total = 0, sum = 0;
+    for (size_t n = 0; n < lives.size(); ++n) total += weight(n);
+    for (size_t n = 0; n < lives.size(); ++n)
+        if ((sum += weight(n)) * 2 >= total) return n;
+    return 0;
+}
+
+json lives_json(const SpanResult& all) {
+    json deaths = json::object();
+    for (size_t cause = 0; cause < all.deaths.size() && cause < std::size(death_names); ++cause)
+        deaths[death_names[cause]] = all.deaths[cause];
+    return {{"median_frames", median_life(all.lives, false)}, {"median_frames_by_point", median_life(all.lives, true)}, {"ended_by", deaths}};
+}
+
 void add(SpanResult& sum, const SpanResult& more) {
     sum.bits.structure += more.bits.structure, sum.bits.births += more.bits.births, sum.bits.motion += more.bits.motion;
     sum.bits.normals += more.bits.normals, sum.bits.drops += more.bits.drops;
-    sum.layer_bytes.resize(std::max(sum.layer_bytes.size(), more.layer_bytes.size()));
-    for (size_t l = 0; l < more.layer_bytes.size(); ++l) sum.layer_bytes[l] += more.layer_bytes[l];
+    add(sum.layer_bytes, more.layer_bytes), add(sum.lives, more.lives), add(sum.deaths, more.deaths);
     sum.tracks += more.tracks, sum.point_frames += more.point_frames, sum.measured.add(more.measured);
     const size_t shared = sum.numbers.empty() ? 0 : 1;  // the border frame
     sum.numbers.insert(sum.numbers.end(), more.numbers.begin() + long(shared), more.numbers.end());
@@ -60,6 +85,7 @@ json asset_settings(const CookFacts& facts, const std::vector<SpanResult>& spans
                          {"normals", bytes(all.bits.normals)}, {"drops", bytes(all.bits.drops)}};
     settings["layer_bytes"] = all.layer_bytes, settings["tracks"] = all.tracks;
     settings["points_per_frame"] = double(all.point_frames) / double(all.numbers.size());
+    settings["lives"] = lives_json(all);
     settings["measured"] = summary_json(all.measured, diagonal);
     add_numbers(settings, all.numbers);
     return settings;

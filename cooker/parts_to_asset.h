@@ -20,6 +20,8 @@ struct SpanResult {
     ChunkBits bits;
     std::vector<double> layer_bytes;
     uint64_t tracks = 0, point_frames = 0;
+    std::vector<uint64_t> lives;      ///< [n]: tracks that were seen at n frames, over all their windows
+    std::vector<uint64_t> deaths;     ///< tracks by what ended them, as death_names
     double tolerance = 0;             ///< metres: what the closed loop settled on
     int attempts = 0;
     ErrorTotals measured;

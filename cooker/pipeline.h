@@ -21,11 +21,13 @@ namespace rill::cooker {
 
 /// Why a track ends before its window does.
 enum class Death { none, left_surface, crowded, surplus };
+inline constexpr const char* death_names[] = {"span_ends", "left_surface", "crowded", "surplus"};
 
 /// One track while it is made: samples birth … death of its window.
 struct Path {
     int birth = 0, death = 0;
     bool continues = false;              ///< comes from the previous window
+    int age = 0;                         ///< frames it has lived before this window's first
     Death cause = Death::none;           ///< set: is not carried on
     int surplus = 0;                     ///< frames in a row that it was not needed
     float radius = 0;                    ///< of the local fit that places it, metres

@@ -5,6 +5,9 @@
 // walls and other liquid). So the path is sub-stepped through the velocities of BOTH frames, which also serves
 // sources whose velocity is the one that brought the liquid here; where it leaves the surface, the point slides:
 // first along its own tangent motion, at last staying where it is.
+//
+// Tried (dam_break 26-42 at 0.25e, 193 kB): points also pushed apart along the surface, .15 or .4 of the overlap a frame: a
+// quarter of the deaths by crowding, 203 and 216 kB, for the pushes themselves must be coded.
 #include <algorithm>
 #include <cmath>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The mesher's memory and its table of stages. march.cpp finds the surface cells, cells_to_vertices.cpp
-// places their vertices, mesh_to_buffers.cpp joins them to triangles in the caller's buffers.
+// The mesher's memory and its table of stages. march.cpp finds the surface cells, drop_specks.cpp
+// clears noise from them, cells_to_vertices.cpp places their vertices, mesh_to_buffers.cpp joins them to
+// triangles in the caller's buffers.
 #include "field_to_mesh.h"
 
 #include <algorithm>
@@ -79,7 +80,8 @@ void begin_mesh(Mesher* m, const MeshInput& input) noexcept {
 
 const Stage* mesh_stages(uint32_t* count) noexcept {
     static constexpr Stage stages[] = {
-        {prepare_march, run_march, true},        {prepare_counts, run_counts, false},
+        {prepare_march, run_march, true},        {prepare_specks, run_find_specks, false},
+        {prepare_specks, run_turn_specks, false}, {prepare_counts, run_counts, false},
         {prepare_vertices, run_vertices, false}, {prepare_quads, run_quads, false},
         {prepare_ranges, nullptr, false},
     };

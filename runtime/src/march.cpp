@@ -188,9 +188,6 @@ void borrow_corners(const Mesher& m, Tile& tile) {
     }
 }
 
-/// Faces spanned by corners x and x + 1 of the rows: both signs present.
-uint32_t mixed(uint32_t any, uint32_t all) { return (any | any >> 1) & ~(all & all >> 1) & 0xff; }
-
 /// Visits the pending cells, and makes pending what lies beyond their sign-changing faces.
 void visit(Tile& tile) {
     uint8_t next[rows_per_tile] = {};
@@ -201,7 +198,7 @@ void visit(Tile& tile) {
         const uint16_t* corner = tile.inside + y + 9 * z;
         const uint32_t a = corner[0], b = corner[1], c = corner[9], d = corner[10];
         const uint32_t any = a | b | c | d, all = a & b & c & d;
-        const uint32_t active = pending & mixed(any, all), x_faces = any & ~all;
+        const uint32_t active = pending & surface_cells(tile, row), x_faces = any & ~all;
         tile.visited[row] |= uint8_t(pending), tile.surface[row] |= uint8_t(active);
         const uint32_t left = active & x_faces, right = active & (x_faces >> 1);
         next[row] |= uint8_t(left >> 1 | right << 1);

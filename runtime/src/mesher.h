@@ -28,6 +28,7 @@ struct Tile {
     uint8_t surface[rows_per_tile];  ///< visited, with corners of both signs
     uint64_t cross[6];               ///< cells wanted of the neighbour beyond each face, this round
     uint16_t known[81], inside[81];  ///< corners evaluated; those of negative value
+    uint16_t speck[81];              ///< corners whose sign is noise
     float lower[3], upper[3];        ///< of all vertices its triangles use
     union {
         float value[corners_per_tile];  ///< until the vertices are placed
@@ -37,6 +38,14 @@ struct Tile {
         } placed;
     };
 };
+
+/// Faces spanned by corners x and x + 1 of the rows: both signs present.
+constexpr uint32_t mixed(uint32_t any, uint32_t all) { return (any | any >> 1) & ~(all & all >> 1) & 0xff; }
+/// Cells of a row with corners of both signs.
+inline uint8_t surface_cells(const Tile& tile, uint32_t row) {
+    const uint16_t* c = tile.inside + row % 8 + 9 * (row / 8);
+    return uint8_t(mixed(c[0] | c[1] | c[9] | c[10], c[0] & c[1] & c[9] & c[10]));
+}
 
 /// Batches of positions on their way through the field; one per worker. Evaluation may reorder a batch, so
 /// `slot` travels with each position.
@@ -115,6 +124,11 @@ void sort_tiles(Mesher& m) noexcept;
 // march.cpp: field → surface cells
 uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
+
+// drop_specks.cpp
+uint32_t prepare_specks(void* mesher);
+void run_find_specks(void* mesher, uint32_t task, uint32_t worker);
+void run_turn_specks(void* mesher, uint32_t task, uint32_t worker);
 
 // cells_to_vertices.cpp
 uint32_t prepare_counts(void* mesher);
