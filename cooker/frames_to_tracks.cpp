@@ -15,6 +15,7 @@ constexpr int most_rounds = 8;  // of births at one frame
 constexpr int patience = 4;                        // frames a track is surplus before it dies
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
+constexpr float mended = 2;                        // tolerances of error left by coding that bear a point
 constexpr float surplus_angle = 0.1f;              // radians
 constexpr float widest = 5;                        // spacing that thinning leaves, in edges: beyond, patches outreach
                                                    // the liquid's depth and the winding number has too few discs
@@ -32,11 +33,11 @@ Sweep alive_at(const Window& window, int sample) {
 }
 
 /// Carries every track alive at sample − 1 on to sample; those that cannot be carried have died.
-void carry_on(Window& window, int sample, int jobs) {
+void carry_on(Window& window, int sample, int jobs, size_t first_path = 0) {
     const SurfaceFrame &from = *window.frames[size_t(sample - 1)], &to = *window.frames[size_t(sample)];
     const float seconds = float(window.seconds[size_t(sample)] - window.seconds[size_t(sample - 1)]);
-    parallel_for(window.paths.size(), jobs, [&](size_t i) {
-        Path& path = window.paths[i];
+    parallel_for(window.paths.size() - first_path, jobs, [&](size_t i) {
+        Path& path = window.paths[first_path + i];
         if (path.death != sample - 1 || path.cause != Death::none) return;
         if (const auto next = carry_point(from, to, seconds, path.at.back(), path.radius)) {
             path.at.push_back(*next);
@@ -106,9 +107,9 @@ float spacing_at(const std::vector<SurfacePoint>& points, const VertexTree& tree
 
 /// Bears tracks where the frame misses the source; returns how many.
 size_t bear_tracks(Window& window, int sample, const Residual& residual, const std::vector<SurfacePoint>& points,
-                   const WindowGoal& goal) {
+                   const WindowGoal& goal, float threshold) {
     const SurfaceFrame& frame = *window.frames[size_t(sample)];
-    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, goal.tolerance);
+    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, threshold);
     std::vector<SurfacePoint> all = points;
     all.insert(all.end(), births.begin(), births.end());
     std::vector<glm::vec3> positions;
@@ -142,9 +143,22 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
         if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);
-        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal);
+        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal, goal.tolerance);
         last = born * enough <= sweep.points.size() || round + 1 == most_rounds;
         if (born == 0) break;
+    }
+}
+
+/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+    const size_t first = window.paths.size();
+    for (int s = 0; s < window.samples(); ++s) {
+        if (s > 0) carry_on(window, s, goal.jobs, first);
+        std::vector<SurfacePoint> points = decoded_points(coded.decoded, s);
+        for (size_t i = first; i < window.paths.size(); ++i)
+            if (window.paths[i].alive(s)) points.push_back(window.paths[i].target(s));
+        const Residual residual = measure_residual(*window.frames[size_t(s)], points, goal.jobs);
+        bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
     }
 }
 
@@ -199,6 +213,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
             coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
         });
         if (round == coding_rounds) return coded;
+        if (round == 0) mend(window, coded, goal);
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
             const SurfaceFrame& frame = *window.frames[s];
             std::vector<uint32_t> ids;

@@ -11,7 +11,7 @@
 namespace rill {
 namespace {
 
-constexpr float disc_share = 0.4f;  // of a patch's support: discs of neighbours just overlap
+constexpr float disc_share = 0.25f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
 int32_t tile_at(const Mesher& m, float x) {
@@ -75,18 +75,21 @@ void seed_drop(Mesher& m, uint32_t i) {
 /// is nearest to. A guess is enough: the march finds what is missed.
 void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const surface::Field& f = *m.input.field;
-    const float cells = 1 / m.input.cell_size, radius = disc_share * f.support[i] * cells + 0.5f;
+    const surface::Patch& q = f.patches[i];
+    const float cells = tile_cells * m.inverse_tile, radius = disc_share * f.support[i] * cells + 0.5f;
     const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
     float at[3];  // in cells of this tile
+    for (int a = 0; a < 3; ++a) {
+        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
+        if (!(at[a] > -radius && at[a] < tile_cells + radius)) return;
+    }
     int from[3], to[3], home[3];
     bool is_home = true;
     for (int a = 0; a < 3; ++a) {
-        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
-        from[a] = int(std::clamp(std::floor(at[a] - radius), 0.f, 8.f));
-        to[a] = int(std::clamp(std::floor(at[a] + radius), -1.f, 7.f));
-        if (from[a] > to[a]) return;
+        from[a] = std::max(int(at[a] - radius + tile_cells) - tile_cells, 0);  // rounds down from −8 up
+        to[a] = std::min(int(at[a] + radius), tile_cells - 1);
         is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
-        home[a] = int(std::clamp(at[a], 0.f, 7.f));
+        home[a] = std::clamp(int(at[a]), 0, tile_cells - 1);
     }
     if (is_home) want(tile, home);
     const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
@@ -101,9 +104,8 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
             r[u] = float(cell[u]) + 0.5f - at[u], r[v] = float(cell[v]) + 0.5f - at[v];
             r[axis] = slope_u * r[u] + slope_v * r[v];  // in the plane; then by the quadratic above it
             if (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > radius * radius) continue;
-            const float above =
-                f.qxx[i] * r[0] * r[0] + f.qyy[i] * r[1] * r[1] + f.qzz[i] * r[2] * r[2] +
-                2 * (f.qxy[i] * r[0] * r[1] + f.qxz[i] * r[0] * r[2] + f.qyz[i] * r[1] * r[2]);
+            const float above = q.xx * r[0] * r[0] + q.yy * r[1] * r[1] + q.zz * r[2] * r[2] +
+                                q.xy * r[0] * r[1] + q.xz * r[0] * r[2] + q.yz * r[1] * r[2];
             const float middle = at[axis] + r[axis] + bend * above;
             const int last = int(std::clamp(std::floor(middle + half), -1.f, 7.f));
             cell[axis] = int(std::clamp(std::floor(middle - half), 0.f, 8.f));
@@ -112,17 +114,8 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
 }
 
 void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
-    surface::Box box;
-    const float size = tile_cells * m.input.cell_size;
-    for (int a = 0; a < 3; ++a)
-        box.lower[a] = float(tile.coord[a]) * size, box.upper[a] = float(tile.coord[a] + 1) * size;
-    const uint32_t count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
-    for (uint32_t c = 0; c < std::min(count, s.most_candidates); ++c)
+    for (uint32_t c = 0; c < std::min(s.candidate_count, s.most_candidates); ++c)
         if (s.candidates[c] < m.input.field->point_count) draw_disc(m, tile, s.candidates[c]);
-}
-
-float corner_at(const Mesher& m, const Tile& tile, uint32_t axis, uint32_t corner) {
-    return float(tile_cells * tile.coord[axis] + int32_t(corner)) * m.input.cell_size;
 }
 
 /// Evaluates the corners of the pending cells that are not known yet.
@@ -135,6 +128,9 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
             need[row] |= corners, need[row + 1] |= corners, need[row + 9] |= corners,
                 need[row + 10] |= corners;
         }
+    float place[3][tile_corners];
+    for (uint32_t a = 0; a < 3; ++a)
+        for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(m, tile, a, k);
     uint32_t n = 0;
     // Octant by octant, so that batches are compact.
     for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -145,15 +141,14 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
                 const uint32_t row = y + 9 * z;
                 uint32_t bits = need[row] & ~uint32_t(tile.known[row]) & (octant & 1 ? 0x1e0 : 0x01f);
                 tile.known[row] |= uint16_t(bits);
-                for (uint32_t x = 0; bits; ++x, bits >>= 1) {
-                    if (!(bits & 1)) continue;
-                    s.x[n] = corner_at(m, tile, 0, x), s.y[n] = corner_at(m, tile, 1, y);
-                    s.z[n] = corner_at(m, tile, 2, z), s.slot[n++] = uint16_t(x + 9 * row);
-                }
+                const float py = place[1][y], pz = place[2][z];
+                for_bits(bits, [&](uint32_t x) {
+                    s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x + 9 * row);
+                });
             }
     }
     s.corners_evaluated += n;
-    for_batches(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
+    with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
         m.access.evaluate(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
                           s.value + first);
     });
@@ -293,6 +288,7 @@ void run_march(void* mesher, uint32_t task, uint32_t worker) {
     for_tiles(task, tiles_per_march_task, m.active_count, [&](uint32_t i) {
         Tile& tile = m.tiles[m.active[i]];
         std::memset(tile.cross, 0, sizeof(tile.cross));
+        list_candidates(m, s, tile);
         if (!tile.seeded) draw_discs(m, s, tile);
         tile.seeded = true;
         borrow_corners(m, tile);

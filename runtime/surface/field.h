@@ -23,21 +23,32 @@ struct Box {
     float lower[3], upper[3];
 };
 
-/// Points of one region as a single oriented disc, for the winding number.
+/// Points of one region, or clusters of a wider one, as a single oriented disc, for the winding number.
 struct Cluster {
     float centre[3], area[3];  ///< area: Σ area · normal / 4π
-    float radius;              ///< of a ball round the centre that holds them
-    uint32_t first, last;      ///< into Field::cluster_member
+    float limit;               ///< squared distance from which it counts as one disc
+    uint32_t first, last;      ///< into Field::cluster_member, or Field::clusters
+};
+
+struct Kernels;
+
+/// What evaluation reads of a point: one cache line.
+struct alignas(64) Patch {
+    float x, y, z, nx, ny, nz;
+    float xx, yy, zz, xy, xz, yz;  ///< of Q; the mixed ones doubled
+    float inverse;                 ///< 1 / R²
+    float activity, recede;        ///< and 1 / activity: a point that fades recedes
+    float unused;
 };
 
 /// All memory is the caller's: one block of field_bytes(), 64-byte aligned.
 struct Field {
     // Points sorted by grid cell (ties by input index), and their local quadratics.
     uint32_t point_count, drop_count;
+    Patch* patches;
     float *x, *y, *z;                      ///< position
     float *nx, *ny, *nz;                   ///< normal of the patch (unit)
-    float *qxx, *qyy, *qzz, *qxy, *qxz, *qyz;  ///< Γ = d + n·r + rᵀQr, Q acts in the tangent plane
-    float* support;                        ///< radius R_i beyond which the patch has no weight
+    float *support, *steep;                ///< radius R_i beyond which the patch has no weight, and 1 / R_i²
     float* activity;
     float* area;                           ///< that the point stands for, over 4π, for the winding number
     float *vx, *vy, *vz;
@@ -48,9 +59,10 @@ struct Field {
     uint32_t* cell_start;
     uint32_t grid_size[3];
     float grid_origin[3], grid_cell;
-    Cluster* clusters;
+    Cluster *clusters, *groups;
     uint32_t* cluster_member;              ///< sorted points, cluster by cluster
-    uint32_t cluster_count;
+    uint32_t cluster_count, group_count;
+    const Kernels* kernels;                ///< what evaluation runs on
     float largest_support, largest_reach;  ///< over points; over drops
     float lower[3], upper[3];              ///< of everything with weight
 };
