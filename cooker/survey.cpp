@@ -102,7 +102,7 @@ json kept_survey(const std::string& file, const std::string& states, const ReadO
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
     if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 1) return nullptr;
-    const bool same = kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
+    const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
 
@@ -161,7 +161,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 1}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 1}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

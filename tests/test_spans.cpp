@@ -170,7 +170,13 @@ TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are
     const auto stop_at = [&](uint32_t frame) {
         CHECK_THROWS_AS(clip.cook(clip.asset, [&](const CookProgress& p) { if (p.stage == "cooking" && p.frames_done >= frame) throw Stop(); }), Stop);
     };
+    std::string said;
+    clip.settings.read.warn = [&](const std::string& message) { said += message; };
+    stop_at(1);  // within the first: nothing to keep
+    CHECK(clip.files() == 1);
+    CHECK(!has(said, "keeps the finished spans"));
     stop_at(9);  // within the third span
+    CHECK(has(said, "keeps the finished spans"));
     REQUIRE(clip.files() == 2);
     fs::path kept;
     for (const auto& entry : fs::directory_iterator(clip.folder.path))

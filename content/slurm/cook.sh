@@ -10,6 +10,9 @@ if [ $# -lt 2 ]; then
     sed -n '3,8s/^# //p' "$0" >&2
     exit 1
 fi
+quoted() {  # words as the jobs' shell is to read them
+    for word; do printf "'%s' " "$(printf %s "$word" | sed "s/'/'\\\\''/g")"; done
+}
 absolute() { case $1 in /*) echo "$1" ;; *) echo "$PWD/$1" ;; esac }
 RILL=$(command -v "${RILL:-rill}") || { echo "cook.sh: no rill tool; set RILL" >&2; exit 1; }
 INPUT=$(absolute "$1")
@@ -24,19 +27,19 @@ export RILL INPUT ASSET SEGMENTS CPUS PARTS
 # Looked at once, before all tasks do it.
 survey=$(sbatch --parsable --job-name=rill-survey --cpus-per-task="$CPUS" --output="$PARTS/survey.log" <<END
 #!/bin/sh
-exec "\$RILL" cook "\$INPUT" --survey "\$PARTS/survey.json" --jobs "\$CPUS" $(printf "'%s' " "$@")
+exec "\$RILL" cook "\$INPUT" --survey "\$PARTS/survey.json" --jobs "\$CPUS" $(quoted "$@")
 END
 )
 cook=$(sbatch --parsable --job-name=rill-cook --dependency=afterok:"${survey%%;*}" --array=1-"$SEGMENTS" --cpus-per-task="$CPUS" \
     --output="$PARTS/segment_%a.log" <<END
 #!/bin/sh
-exec "\$RILL" cook "\$INPUT" -o "\$PARTS/\$SLURM_ARRAY_TASK_ID.part" --segment "\$SLURM_ARRAY_TASK_ID/\$SEGMENTS" \
-    --survey "\$PARTS/survey.json" --jobs "\$CPUS" $(printf "'%s' " "$@")
+exec "\$RILL" cook "\$INPUT" -o "\$PARTS/\$SLURM_ARRAY_TASK_ID-of-\$SEGMENTS.part" --segment "\$SLURM_ARRAY_TASK_ID/\$SEGMENTS" \
+    --survey "\$PARTS/survey.json" --jobs "\$CPUS" $(quoted "$@")
 END
 )
 link=$(sbatch --parsable --job-name=rill-link --dependency=afterok:"${cook%%;*}" --output="$ASSET.log" <<END
 #!/bin/sh
-"\$RILL" link "\$PARTS"/*.part -o "\$ASSET"
+"\$RILL" link "\$PARTS"/*-of-"\$SEGMENTS".part -o "\$ASSET"
 code=\$?
 [ \$code -ne 0 ] && [ \$code -ne 3 ] || rm -rf "\$PARTS"
 exit \$code
