@@ -34,8 +34,8 @@ size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
 uint32_t grid_capacity(uint32_t points) { return 8 * points + 64; }
 
 /// Clusters are blocks of so many grid cells a side; a block of many points makes several.
-constexpr uint32_t cluster_cells = 4, cluster_size = 32;
-constexpr uint32_t group_cells = 4 * cluster_cells;  // groups of clusters likewise
+constexpr uint32_t cluster_cells = 3, cluster_size = 32;
+constexpr uint32_t group_cells = 3 * cluster_cells;  // groups of clusters likewise
 uint32_t cluster_capacity(uint32_t points) { return points; }
 
 struct Carver {
