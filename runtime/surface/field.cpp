@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Building the field: grid, supports, local quadratics. Evaluation stands in field_evaluate.cpp.
+// Building the field: grid, supports, local quadratics. Evaluation stands in field_evaluate.cpp and field_kernels.cpp.
 //
 // Departures from the paper, each measured on real liquids:
 //   rows      weighted by distance, only neighbours that face the same way
@@ -34,8 +34,8 @@ size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
 uint32_t grid_capacity(uint32_t points) { return 8 * points + 64; }
 
 /// Clusters are blocks of so many grid cells a side; a block of many points makes several.
-constexpr uint32_t cluster_cells = 4, cluster_size = 32;
-constexpr uint32_t group_cells = 4 * cluster_cells;  // groups of clusters likewise
+constexpr uint32_t cluster_cells = 3, cluster_size = 32;
+constexpr uint32_t group_cells = 3 * cluster_cells;  // groups of clusters likewise
 uint32_t cluster_capacity(uint32_t points) { return points; }
 
 struct Carver {
@@ -214,11 +214,11 @@ struct Surroundings {
     }
     /// Those within the ball of squared radius `bound`.
     void offer_all(const Field& f, uint32_t i, float bound, Neighbours& found) {
-        const float px = f.x[i], py = f.y[i], pz = f.z[i], px_n = f.nx[i], py_n = f.ny[i], pz_n = f.nz[i];
+        const float px = f.x[i], py = f.y[i], pz = f.z[i], nx_i = f.nx[i], ny_i = f.ny[i], nz_i = f.nz[i];
         for (uint32_t c = 0; c < count; ++c) {
             const float dx = x[c] - px, dy = y[c] - py, dz = z[c] - pz;
             d2[c] = dx * dx + dy * dy + dz * dz;
-            agree[c] = nx[c] * px_n + ny[c] * py_n + nz[c] * pz_n;
+            agree[c] = nx[c] * nx_i + ny[c] * ny_i + nz[c] * nz_i;
         }
         uint32_t close = 0;
         for (uint32_t c = 0; c < count; ++c) {  // no branch: who is close is past foretelling
@@ -309,8 +309,8 @@ bool solve3(const float m[6], const float r[3], float out[3]) {
     return true;
 }
 
-void fit_patch(Field& f, uint32_t i, Surroundings& around_it) {
-    const Neighbours neighbours = find_neighbours(f, i, around_it);
+void fit_patch(Field& f, uint32_t i, Surroundings& surroundings) {
+    const Neighbours neighbours = find_neighbours(f, i, surroundings);
     // A lone point of its side must not reach across its whole surroundings.
     const float around = std::sqrt(neighbours.any[support_neighbour - 1]);
     // And a droplet of a few points must not take its measure from the next droplet.
@@ -458,8 +458,8 @@ void begin_field(Field& field, void* memory, const format::PointSet& points,
 }
 
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
-    Surroundings around;
-    for (uint32_t i = first; i < last; ++i) fit_patch(field, i, around);
+    Surroundings surroundings;
+    for (uint32_t i = first; i < last; ++i) fit_patch(field, i, surroundings);
 }
 
 void finish_field(Field& f) noexcept {

@@ -6,7 +6,7 @@
 // Method: Keeler & Bridson, "Compact Iso-Surface Representation and Compression for Fluid
 // Phenomena", section 2: Γ_i(x) = d + n·r + a τ1² + b τ1 τ2 + c τ2² (eq. 1), a, b, c by minimal-norm
 // least squares over neighbours (eq. 2), blended with compact weights. Measured departures from
-// the paper stand in field.cpp.
+// the paper stand in field.cpp, field_rules.h and field_kernels.cpp.
 //
 // Sign: negative in the liquid, positive in the air; about a distance (metres) near the surface.
 // Everything is a pure function of (points, drops, x): no order, thread or tile changes a bit.
@@ -85,8 +85,10 @@ void finish_field(Field& field) noexcept;
 uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capacity) noexcept;
 
 /// Field values at n positions, from candidates that gather() gave for a box holding them all.
-/// Where no patch has weight: negative (with no gradient) in the liquid, +unsupported in the air, by the winding
-/// number of all points.
+/// Where no patch has weight there is no gradient, the winding number of all points gives the sign, and the nearest
+/// point about the distance: in the liquid at most a grid cell, in the air at most the largest support, beyond it
+/// +unsupported. Positions next to each other in the list should be next to each other in space: batches of 16 share
+/// what they are evaluated from.
 inline constexpr float unsupported = 1e30f;
 void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
               const float* x, const float* y, const float* z, uint32_t n, float* value) noexcept;

@@ -244,22 +244,22 @@ RILL_INLINE void reach(const float* const point[7], uint32_t n, const float lowe
 }
 
 // One set of entry points per instruction set; everything above is inlined into each.
-#define RILL_LEVEL(id, target)                                                                                    \
-    target void reach_##id(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],   \
-                           float* least) {                                                                        \
-        reach(point, n, lower, upper, least);                                                                     \
-    }                                                                                                             \
-    target void blend_##id(const Field& f, const uint32_t* list, uint32_t count, Batch& b) {                      \
-        blend(f, list, count, b);                                                                                 \
-    }                                                                                                             \
-    target void slope_##id(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, bool velocity,   \
-                           Slopes& out) {                                                                         \
-        slope(f, list, count, b, velocity, out);                                                                  \
-    }                                                                                                             \
-    target void winding_##id(const Field& f, const float* x, const float* y, const float* z, float* number,       \
-                             float* distance2) {                                                                  \
-        winding(f, x, y, z, number, distance2);                                                                                 \
-    }                                                                                                             \
+#define RILL_LEVEL(id, target)                                                                                 \
+    target void reach_##id(const float* const point[7], uint32_t n, const float lower[3], const float upper[3], \
+                           float* least) {                                                                     \
+        reach(point, n, lower, upper, least);                                                                  \
+    }                                                                                                          \
+    target void blend_##id(const Field& f, const uint32_t* list, uint32_t count, Batch& b) {                   \
+        blend(f, list, count, b);                                                                              \
+    }                                                                                                          \
+    target void slope_##id(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, bool velocity, \
+                           Slopes& out) {                                                                      \
+        slope(f, list, count, b, velocity, out);                                                               \
+    }                                                                                                          \
+    target void winding_##id(const Field& f, const float* x, const float* y, const float* z, float* number,    \
+                             float* distance2) {                                                               \
+        winding(f, x, y, z, number, distance2);                                                                \
+    }                                                                                                          \
     constexpr Kernels kernels_##id{#id, reach_##id, blend_##id, slope_##id, winding_##id};
 
 #if defined(__GNUC__) && !defined(__clang__)
