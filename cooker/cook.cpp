@@ -92,7 +92,9 @@ void count_lives(SpanResult& account, const Window& window, bool ends_span) {
 
 void write_window(AssetWriter& writer, uint32_t first_sample, const Window& window, const CodedWindow& coded, const WindowGoal& goal,
                   uint32_t layers, bool ends_span, SpanResult& account) {
-    const std::vector<uint32_t> layer = assign_layers(window, layers);
+    std::vector<float> cost;
+    for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
+    const std::vector<uint32_t> layer = assign_layers(coded.decoded, cost, window.samples(), layers, goal.jobs);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(window, most_tracks_per_block, block_count);
     const std::vector<LayerError> errors = layer_errors(window, coded, layer, layers, goal.jobs);

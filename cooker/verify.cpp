@@ -15,7 +15,7 @@ namespace {
 
 FrameMeasure measure(const Mesh& source, const Mesh& decoded) {
     FrameMeasure frame;
-    frame.source_triangles = uint32_t(source.triangles.size());
+    frame.source_triangles = uint32_t(source.triangles.size()), frame.source_vertices = uint32_t(source.positions.size());
     frame.decoded_triangles = uint32_t(decoded.triangles.size());
     frame.edge = median_edge(source);
     frame.distance = surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded));

@@ -15,7 +15,7 @@ namespace rill::cooker {
 struct FrameMeasure {
     int number = 0;              ///< the source's
     double seconds = 0;          ///< after the asset's first frame
-    uint32_t source_triangles = 0, decoded_triangles = 0;
+    uint32_t source_triangles = 0, source_vertices = 0, decoded_triangles = 0;
     double edge = 0;             ///< median edge of the source frame, metres
     SurfaceDistance distance;
     Topology source, decoded;

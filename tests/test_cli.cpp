@@ -373,14 +373,22 @@ TEST_CASE("compare: Draco's size falls and its error grows with fewer bits") {
     CAPTURE(result.text);
     REQUIRE(result.code == 0);
     const nlohmann::json json = json_of(folder / "c.json");
-    REQUIRE(json["rivals"].size() == 2);
+    REQUIRE(json["rivals"].size() == 3);
+    for (const nlohmann::json& rival : json["rivals"])
+        for (const nlohmann::json& point : rival["points"]) {
+            CHECK(point["bytes_with_velocity_per_frame"].get<double>() > point["bytes_per_frame"].get<double>());
+            CHECK(point["decode_ms"].get<double>() > 0);
+        }
     const nlohmann::json& points = json["rivals"][0]["points"];
-    REQUIRE(points.size() == 5);
+    REQUIRE(points.size() == 7);
     for (size_t i = 1; i < points.size(); ++i) {
         CHECK(points[i]["bytes_per_frame"].get<double>() > points[i - 1]["bytes_per_frame"].get<double>());
         CHECK(points[i]["mean_m"].get<double>() < points[i - 1]["mean_m"].get<double>());
     }
     CHECK(json["rill"]["bytes_per_frame"].get<double>() > 0);
+    const Result missing = run_rill("compare " + clip().input + " --asset " + clip().asset + " --frames 3:3 --decimator /nonexistent/tool");
+    CHECK(missing.code == 2);
+    CHECK(missing.text.find("/nonexistent/tool: ") != std::string::npos);
 }
 
 TEST_CASE("cook: dry run, up to date, depfile, segments and link") {

@@ -430,7 +430,7 @@ TEST_CASE("OBJ") {
 TEST_CASE("Draco") {
     const TestFolder folder;
     const Mesh ball = moving_ball(2);
-    const std::string good = draco_encode(ball, 14);
+    const std::string good = draco_encode(ball, 14, 14);
     put_file(folder / "d2.drc", good);
     const auto reader = open_sequence(folder / "*.drc", {});
     CHECK(reader->info().velocity == VelocityMeaning::unknown);

@@ -121,7 +121,7 @@ DracoRate draco_rate(BenchPlayer& player, const std::vector<uint32_t>& frames) {
         Mesh mesh;
         player.play(player.seconds_of(frames[frames.size() * k / count]), 0, &mesh);
         if (mesh.triangles.empty()) continue;
-        const std::string bytes = draco_encode(mesh, 10);
+        const std::string bytes = draco_encode(mesh, 10, 10);
         const uint64_t start = processor_microseconds();
         const Mesh decoded = draco_decode(bytes, "Draco");
         rate.seconds += 1e-6 * double(processor_microseconds() - start);

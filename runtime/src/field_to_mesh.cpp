@@ -80,8 +80,8 @@ void begin_mesh(Mesher* m, const MeshInput& input) noexcept {
 
 const Stage* mesh_stages(uint32_t* count) noexcept {
     static constexpr Stage stages[] = {
-        {prepare_march, run_march, true},        {prepare_specks, run_find_specks, false},
-        {prepare_specks, run_turn_specks, false}, {prepare_counts, run_counts, false},
+        {prepare_march, run_march, true},        {prepare_find_specks, run_find_specks, false},
+        {prepare_turn_specks, nullptr, false}, {prepare_counts, run_counts, false},
         {prepare_vertices, run_vertices, false}, {prepare_quads, run_quads, false},
         {prepare_ranges, nullptr, false},
     };

@@ -28,7 +28,8 @@ struct Tile {
     uint8_t surface[rows_per_tile];  ///< visited, with corners of both signs
     uint64_t cross[6];               ///< cells wanted of the neighbour beyond each face, this round
     uint16_t known[81], inside[81];  ///< corners evaluated; those of negative value
-    uint16_t speck[81];              ///< corners whose sign is noise
+    uint8_t speck[rows_per_tile];    ///< corners that begin a piece which is noise; the tile's own, as cells
+    bool has_specks;
     float lower[3], upper[3];        ///< of all vertices its triangles use
     union {
         float value[corners_per_tile];  ///< until the vertices are placed
@@ -142,9 +143,9 @@ uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
 
 // drop_specks.cpp
-uint32_t prepare_specks(void* mesher);
+uint32_t prepare_find_specks(void* mesher);
 void run_find_specks(void* mesher, uint32_t task, uint32_t worker);
-void run_turn_specks(void* mesher, uint32_t task, uint32_t worker);
+uint32_t prepare_turn_specks(void* mesher);
 
 // cells_to_vertices.cpp
 uint32_t prepare_counts(void* mesher);
