@@ -68,7 +68,6 @@ Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept {
 
 void begin_mesh(Mesher* m, const MeshInput& input) noexcept {
     m->input = input;
-    m->inverse_tile = 1 / (tile_cells * input.cell_size);
     m->cut = m->vertices_wanted = m->indices_wanted = m->ranges_wanted = 0;
     m->tile_count = m->order_count = m->kept = 0;
     m->active_count = m->next_active_count = m->colour = 0;

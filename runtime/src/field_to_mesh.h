@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "levels.h"
 #include "relay.h"
 #include "rill/rill.h"
 #include "surface/field.h"
@@ -22,7 +23,7 @@ struct FrustumPlanes {
 };
 struct MeshInput {
     const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares
-    float cell_size;              ///< asset space
+    Levels levels;                ///< sizes of cells
     const FrustumPlanes* views;   ///< none: everything
     uint32_t view_count;
     bool velocity;                ///< wanted in the output

@@ -23,6 +23,7 @@
 #include "format/check.h"
 #include "format/fourier_extension.h"
 #include "format/tracks.h"
+#include "levels.h"
 #include "relay.h"
 #include "rill/rill.h"
 #include "surface/field.h"
@@ -37,7 +38,7 @@ struct Directory {
     format::DirectoryTables tables;      ///< settings: zero-terminated
     format::BasisTables basis;
     AssetInfo info;
-    float layer_spacing[format::max_layers];  ///< mean over the clip, of this and coarser layers
+    float layer_error[format::max_layers];  ///< mean over the clip, with this and all coarser layers; falls
     uint32_t most_point_tracks, most_drop_tracks, most_chunks;  ///< of any one window
     uint64_t suggested_resident_bytes;
 };
@@ -101,7 +102,6 @@ void release_tables(Asset& asset) noexcept;
 
 // ---- time, views, directory → plan ----------------------------------------------------------------
 
-inline constexpr uint32_t most_views = 16;
 inline constexpr float prefetch_seconds = 1;       ///< of real time, and one window at least
 
 struct Moment {
@@ -115,8 +115,8 @@ struct Want {
     float seconds_until_needed;    ///< real seconds
 };
 struct Detail {
-    float cell_size;               ///< asset space
-    uint32_t layers;               ///< prefix wanted
+    float cell_size;               ///< the smallest in sight, asset space
+    uint32_t layers;               ///< longest prefix wanted of any block
     float pixel_error;             ///< what cell_size comes to on the screen, at its nearest; 0: no view
 };
 struct Plan {
@@ -125,11 +125,11 @@ struct Plan {
     uint32_t view_count;
     FrustumPlanes views[most_views];   ///< asset space
     float eyes[most_views][3];         ///< asset space
+    Levels levels;                 ///< kept from frame to frame while the views hardly move (hysteresis)
     Detail detail;
     uint32_t blocks_in_view;
     uint32_t now_count, want_count;    ///< wants[0, now_count) are of this moment, the rest is prefetch
     Want* wants;                       ///< chunk_count of them: most important first
-    int32_t level;                     ///< cell = source's · 2^level; kept between frames (hysteresis)
 };
 Moment moment_at(const Directory& directory, double seconds) noexcept;
 /// Real seconds until `window` is needed by the play direction; what lies behind comes after all that is ahead.

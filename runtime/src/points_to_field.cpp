@@ -25,7 +25,7 @@ uint32_t prepare_mesh(void* context) {
     auto& player = *static_cast<Player*>(context);
     surface::finish_field(player.field);
     Target* target = player.frame.target;
-    begin_mesh(player.mesher, MeshInput{&player.field, player.plan.detail.cell_size,
+    begin_mesh(player.mesher, MeshInput{&player.field, player.plan.levels,
                                         player.plan.view_count ? player.plan.views : nullptr,
                                         player.plan.view_count, target->velocity.data != nullptr, target});
     return 0;
