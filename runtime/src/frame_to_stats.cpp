@@ -50,7 +50,7 @@ void count_output(Player& player, Stats& stats) {
     const Evaluation& e = player.evaluation;
     const MeshCounts mesh = mesh_counts(player.mesher);
     stats.points_wanted = e.points_wanted;
-    stats.points_used = e.points.count + e.drops.count;
+    stats.points_used = player.field.point_count + player.field.drop_count;
     stats.vertices_wanted = mesh.vertices_wanted;
     stats.indices_wanted = mesh.indices_wanted;
     stats.cut |= mesh.cut | (e.cut ? uint32_t(cut_points) : 0u);

@@ -14,7 +14,10 @@ namespace {
 constexpr float disc_share = 0.4f;  // of a patch's support: discs of neighbours just overlap
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
-void want(Tile& tile, const int cell[3]) { tile.pending[cell[1] + 8 * cell[2]] |= uint8_t(1 << cell[0]); }
+void want(Tile& tile, const int cell[3]) {
+    const int row = cell[1] + 8 * cell[2];
+    tile.pending[row] |= uint8_t(1 << cell[0] & ~tile.visited[row]);
+}
 
 /// Tiles that the disc of a point may cross.
 struct SeedDisc {

@@ -131,6 +131,9 @@ struct Plan {
     uint32_t now_count, want_count;    ///< wants[0, now_count) are of this moment, the rest is prefetch
     Want* wants;                       ///< chunk_count of them: most important first
 };
+inline constexpr float reach_in_spacings = 3;      ///< how far points act beyond their own bounds
+/// Whether a box, widened, lies inside a frustum at least in part; true too for some beside its edges.
+bool touches(const FrustumPlanes& view, const float* lower, const float* upper, float wider) noexcept;
 Moment moment_at(const Directory& directory, double seconds) noexcept;
 /// Real seconds until `window` is needed by the play direction; what lies behind comes after all that is ahead.
 float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept;

@@ -27,22 +27,42 @@ uint32_t slot_of(const Mesher& m, int32_t level, const int32_t coord[3]) {
     return slot;
 }
 
-/// False when the tile, widened by two cells, lies outside one plane of every view.
-bool in_sight(const Mesher& m, int32_t level, const int32_t coord[3]) {
-    const float cell = m.input.levels.cell(level), size = tile_cells * cell;
-    const float half = 0.5f * size + 2 * cell;  // a coarser neighbour's cell, where there is one
-    const float centre[3] = {(float(coord[0]) + 0.5f) * size, (float(coord[1]) + 0.5f) * size,
-                             (float(coord[2]) + 0.5f) * size};
-    for (uint32_t v = 0; v < m.input.view_count; ++v) {
-        bool outside = false;
+/// How far polygons in sight reach beyond the cell that they cross the border of sight in, in cells.
+float sight_margin(const Mesher& m) { return m.input.levels.eye_count ? 2.f : 1.f; }
+
+/// Of a cube: in a view at least in part, all in one view, or out of all.
+enum class Sight { none, part, whole };
+Sight sight_of(const Mesher& m, const float centre[3], float half) {
+    Sight best = m.input.view_count ? Sight::none : Sight::whole;
+    for (uint32_t v = 0; v < m.input.view_count && best != Sight::whole; ++v) {
+        bool outside = false, inside = true;
         for (const float(&p)[4] : m.input.views[v].planes) {
             const float distance = p[0] * centre[0] + p[1] * centre[1] + p[2] * centre[2] + p[3];
             const float reach = half * (std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]));
             outside = outside || distance < -reach;
+            inside = inside && distance >= reach;
         }
-        if (!outside) return true;
+        if (!outside) best = inside ? Sight::whole : Sight::part;
     }
-    return m.input.view_count == 0;
+    return best;
+}
+Sight sight_of_tile(const Mesher& m, int32_t level, const int32_t coord[3]) {
+    const float cell = m.input.levels.cell(level), size = tile_cells * cell;
+    const float centre[3] = {(float(coord[0]) + 0.5f) * size, (float(coord[1]) + 0.5f) * size,
+                             (float(coord[2]) + 0.5f) * size};
+    return sight_of(m, centre, 0.5f * size + sight_margin(m) * cell);
+}
+
+/// Cells out of sight count as visited: nobody goes there.
+void skip_unseen(const Mesher& m, Tile& tile) {
+    const float half = (0.5f + sight_margin(m)) * tile.cell;
+    for (int32_t row = 0; row < int32_t(rows_per_tile); ++row)
+        for (int32_t x = 0; x < tile_cells; ++x) {
+            const int32_t at[3] = {x, row % 8, row / 8};
+            float centre[3];
+            for (int a = 0; a < 3; ++a) centre[a] = (float(tile_cells * tile.coord[a] + at[a]) + 0.5f) * tile.cell;
+            if (sight_of(m, centre, half) == Sight::none) tile.visited[row] |= uint8_t(1 << x);
+        }
 }
 
 /// A tile is a leaf: boxes of its level beside it are divided, or part of a coarser leaf, or leaves like it.
@@ -92,7 +112,8 @@ uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) n
     if (m.hash[slot]) return m.hash[slot] - 1;
     for (int a = 0; a < 3; ++a)
         if (coord[a] < -farthest_tile || coord[a] >= farthest_tile) return no_tile;
-    if (!in_sight(m, level, coord)) return no_tile;
+    const Sight sight = sight_of_tile(m, level, coord);
+    if (sight == Sight::none) return no_tile;
     if (m.tile_count == m.limits.tiles) {
         m.tiles_ran_out = true;
         return no_tile;
@@ -102,6 +123,7 @@ uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) n
     std::memcpy(tile.coord, coord, sizeof(tile.coord));
     tile.level = level, tile.cell = m.input.levels.cell(level);
     tile.beside = look_round(m.input.levels, level, coord);
+    if (sight == Sight::part) skip_unseen(m, tile);
     m.hash[slot] = ++m.tile_count;
     return m.tile_count - 1;
 }

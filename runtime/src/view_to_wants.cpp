@@ -10,7 +10,6 @@ namespace {
 
 constexpr float automatic_pixel_error = 2;  ///< Budget::pixel_error 0
 constexpr float most_error = 1;             ///< in cells: a layer that leaves so little wrong is fine enough
-constexpr float reach_in_spacings = 3;      ///< how far points act beyond their own bounds
 constexpr float most_cells_across = 1 << 20;
 /// Cells stay as they are while an eye moves by no more than this share of its distance, and the sizes asked for
 /// change by no more than this many octaves: a camera that trembles changes nothing.
@@ -38,19 +37,10 @@ void take_views(const Frame& frame, Plan& plan) {
     }
 }
 
-bool inside(const FrustumPlanes& view, const float* lower, const float* upper, float wider) {
-    for (const float* plane : view.planes) {
-        float farthest = plane[3] + wider;
-        for (int a = 0; a < 3; ++a) farthest += plane[a] * (plane[a] > 0 ? upper[a] : lower[a]);
-        if (farthest < 0) return false;
-    }
-    return true;
-}
-
 bool is_seen(const Plan& plan, const format::ChunkRecord& chunk) {
     if (!plan.view_count) return true;
     for (uint32_t v = 0; v < plan.view_count; ++v)
-        if (inside(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) return true;
+        if (touches(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) return true;
     return false;
 }
 
@@ -82,7 +72,7 @@ Sight look(const Directory& directory, const Plan& plan) {
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
         for (uint32_t v = 0; v < plan.view_count; ++v) {
-            if (!inside(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) continue;
+            if (!touches(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) continue;
             // Nearer than a cell the eye is in the surface: no cell is small enough.
             const float distance = std::max(distance_to(plan.eyes[v], chunk), directory.header.cell_size);
             sight.nearest[v] = std::min(sight.nearest[v], distance);
@@ -219,6 +209,15 @@ uint32_t count_blocks_in_view(const Directory& directory, const Plan& plan) {
 }
 
 }  // namespace
+
+bool touches(const FrustumPlanes& view, const float* lower, const float* upper, float wider) noexcept {
+    for (const float* plane : view.planes) {
+        float farthest = plane[3] + wider;
+        for (int a = 0; a < 3; ++a) farthest += plane[a] * (plane[a] > 0 ? upper[a] : lower[a]);
+        if (farthest < 0) return false;
+    }
+    return true;
+}
 
 /// The last frame at or before the time decides, so a time on a window's border is the later window's.
 Moment moment_at(const Directory& directory, double seconds) noexcept {
