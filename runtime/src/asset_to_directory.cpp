@@ -67,8 +67,9 @@ uint32_t saturate(uint64_t x) { return uint32_t(std::min<uint64_t>(x, UINT32_MAX
 
 void sum_up_windows(Directory& d) {
     uint64_t most_three = 0, last = 0, last_but_one = 0;
-    for (uint32_t i = 0; i < d.header.window_count; ++i) {
-        const format::WindowRecord& w = d.tables.windows[i];
+    // Twice round the end: clips that loop hold the last windows beside the first.
+    for (uint32_t i = 0; i < d.header.window_count + 2; ++i) {
+        const format::WindowRecord& w = d.tables.windows[i % d.header.window_count];
         const WindowNeed need = need_of(d.tables, w);
         d.info.most_points = std::max(d.info.most_points, saturate(need.points + need.drops));
         d.info.largest_window_bytes = std::max(d.info.largest_window_bytes, need.bytes);

@@ -122,6 +122,7 @@ struct Detail {
 struct Plan {
     Moment moment;
     float rate;
+    bool loops;
     uint32_t view_count;
     FrustumPlanes views[most_views];   ///< asset space
     float eyes[most_views][3];         ///< asset space
@@ -135,7 +136,8 @@ inline constexpr float reach_in_spacings = 3;      ///< how far points act beyon
 /// Whether a box, widened, lies inside a frustum at least in part; true too for some beside its edges.
 bool touches(const FrustumPlanes& view, const float* lower, const float* upper, float wider) noexcept;
 Moment moment_at(const Directory& directory, double seconds) noexcept;
-/// Real seconds until `window` is needed by the play direction; what lies behind comes after all that is ahead.
+/// Real seconds until `window` is needed by the play direction, round the end if the clip loops; what lies behind
+/// comes after all that is ahead.
 float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept;
 /// Fills everything but Plan::wants' address. `coarser`: levels to add for the sake of time.
 void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept;

@@ -182,12 +182,12 @@ void list_wants(const Directory& directory, const Frame& frame, Plan& plan) {
     want_window(directory, frame, now, plan);
     plan.now_count = plan.want_count;
     for (uint32_t step = 1; step < end; ++step) {
-        const bool any = back ? step <= now : step < end - now;
-        if (!any) break;
-        const uint32_t window = back ? now - step : now + step;
+        const uint32_t window = (back ? now + end - step : now + step) % end;
+        if (!plan.loops && back != (window < now)) break;
         if (step > 1 && seconds_until(directory, plan, window) > prefetch_seconds) break;
         want_window(directory, frame, window, plan);
     }
+    if (plan.loops) return;
     // Standing still the next move may go either way; going back it often ends in play forward again.
     if (plan.rate == 0 && now > 0) want_window(directory, frame, now - 1, plan);
     if (back && now + 1 < end) want_window(directory, frame, now + 1, plan);
@@ -253,8 +253,13 @@ float seconds_until(const Directory& directory, const Plan& plan, uint32_t windo
     const format::WindowRecord& w = directory.tables.windows[window];
     const bool later = window > plan.moment.window;
     const double border = frame_time(directory, later ? w.first_sample : w.first_sample + w.sample_count - 1);
-    const double distance = std::abs(border - plan.moment.seconds);
+    double distance = std::abs(border - plan.moment.seconds);
     if (plan.rate == 0) return float(distance);
+    if (plan.loops && later != (plan.rate > 0)) {
+        const double clip = frame_time(directory, directory.header.frame_count - 1);
+        const double far = frame_time(directory, later ? w.first_sample + w.sample_count - 1 : w.first_sample);
+        return float((clip - std::abs(far - plan.moment.seconds)) / std::max(1e-6f, std::abs(plan.rate)));
+    }
     const double real = distance / std::max(1e-6f, std::abs(plan.rate));
     return float(later == (plan.rate > 0) ? real : behind + real);
 }
@@ -262,6 +267,7 @@ float seconds_until(const Directory& directory, const Plan& plan, uint32_t windo
 void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept {
     plan.moment = moment_at(directory, frame.seconds);
     plan.rate = frame.rate;
+    plan.loops = frame.loops;
     take_views(frame, plan);
     choose_detail(directory, frame, coarser, plan);
     plan.blocks_in_view = count_blocks_in_view(directory, plan);

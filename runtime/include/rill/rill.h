@@ -165,6 +165,7 @@ struct Target {
 struct Frame {              ///< views and target must stay valid until end_frame()
     double seconds;         ///< where in the clip; any jump is legal; clamped to the clip
     float rate;             ///< clip seconds per real second, signed: steers prefetch
+    bool loops;             ///< beyond one end of the clip comes the other: steers prefetch
     float asset_to_world[12];  ///< three rows of four: rotation·scale | translation
     const View* views;      ///< none: no culling, and cells of the source's size
     uint32_t view_count;
