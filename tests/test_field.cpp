@@ -5,6 +5,7 @@
 #include <map>
 
 #include "mesh_harness.h"
+#include "surface/field_kernels.h"
 
 using namespace mesh_test;
 
@@ -307,6 +308,27 @@ TEST_CASE("candidates beyond reach and the cut into batches change no bit") {
         std::vector<Value> one_by_one;
         for (const Vec& p : positions) one_by_one.push_back(evaluate(real.field, p));
         CHECK(same_bits(values, one_by_one));
+    }
+}
+
+TEST_CASE("every instruction set gives the bits of the scalar code") {
+    Cloud cloud;
+    add(cloud, torus_of(1, 0.4), 0.12);
+    add(cloud, plane_of(1.5, 0.45, -1), 0.12);
+    RealField real(cloud);
+    Random random(12);
+    std::vector<Vec> positions;
+    for (int i = 0; i < 1000; ++i) positions.push_back({3 * random() - 1.5, 3 * random() - 1.5, 1.4 * random() - 0.7});
+    const surface::Kernels* levels[surface::most_kernel_levels];
+    const uint32_t count = surface::kernel_levels(levels);
+    REQUIRE(count > 0);
+    CHECK(real.field.kernels == levels[count - 1]);
+    real.field.kernels = levels[0];
+    const std::vector<Value> reference = evaluate(real.field, positions);
+    for (uint32_t k = 1; k < count; ++k) {
+        CAPTURE(levels[k]->name);
+        real.field.kernels = levels[k];
+        CHECK(same_bits(reference, evaluate(real.field, positions)));
     }
 }
 

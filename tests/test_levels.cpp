@@ -71,6 +71,7 @@ const FieldAccess by_formula{gather_none, analytic, analytic_gradient};
 struct Seeds {
     surface::Field field{};
     std::vector<float> x, y, z, one, nothing, support;
+    std::vector<surface::Patch> patches;
     explicit Seeds(double (*f)(const Vec&), int count = 60) {
         surface_of = f;
         for (int i = 0; i < count; ++i) {
@@ -85,7 +86,8 @@ struct Seeds {
         field.point_count = uint32_t(x.size());
         field.x = x.data(), field.y = y.data(), field.z = z.data();
         field.nx = field.ny = nothing.data(), field.nz = one.data();
-        field.qxx = field.qyy = field.qzz = field.qxy = field.qxz = field.qyz = nothing.data();
+        patches.assign(x.size(), surface::Patch{});
+        field.patches = patches.data();
         field.support = support.data(), field.activity = one.data();
     }
 };

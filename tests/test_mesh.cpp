@@ -19,6 +19,7 @@ namespace {
 struct HandField {
     surface::Field field{};
     std::vector<float> x, y, z, one, nothing, support;
+    std::vector<surface::Patch> patches;
     void seed(double px, double py, double pz) {
         x.push_back(float(px)), y.push_back(float(py)), z.push_back(float(pz));
         one.push_back(1), nothing.push_back(0), support.push_back(1e-3f);
@@ -27,7 +28,8 @@ struct HandField {
         field.point_count = uint32_t(x.size());
         field.x = x.data(), field.y = y.data(), field.z = z.data();
         field.nx = field.ny = nothing.data(), field.nz = one.data();
-        field.qxx = field.qyy = field.qzz = field.qxy = field.qxz = field.qyz = nothing.data();
+        patches.assign(x.size(), surface::Patch{});
+        field.patches = patches.data();
         field.support = support.data(), field.activity = one.data();
         return field;
     }
@@ -169,7 +171,7 @@ TEST_CASE("sphere at many cell sizes, also far from the origin and with cells ab
             CHECK(t.closed_manifold());
             CHECK(t.euler == 2);
             const double relative = std::abs(volume(m) / (4 * pi / 3) - 1);
-            CHECK(relative < 0.02 + 1.4 * double(cell) * double(cell));
+            CHECK(relative < 0.02 + 1.5 * double(cell) * double(cell));
             if (cell > 0.3f) continue;  // clamped to their cells, vertices cannot all reach the surface
             const Error e = error(m, [&](const Vec& p) { return sphere(p - Vec{offset, offset, -offset}); });
             INFO("distance ", e.distance, " in cells ", e.distance / double(cell));

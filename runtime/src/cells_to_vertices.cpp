@@ -64,11 +64,15 @@ CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
     return pattern_of(plain.signs(), turned);
 }
 
+/// Block by block of 4³: vertices next to each other share what they are evaluated from.
 template <typename Work>
 void for_surface_cells(const Tile& tile, Work work) {
-    for (uint32_t row = 0; row < rows_per_tile; ++row)
-        for (uint32_t x = 0, bits = tile.surface[row]; bits; ++x, bits >>= 1)
-            if (bits & 1) work(x + 8 * row);
+    for (uint32_t block = 0; block < 8; ++block)
+        for (uint32_t z = block & 4, rows = 0; rows < 16; ++rows) {
+            const uint32_t row = (z + rows / 4) * 8 + (block * 2 & 4) + rows % 4, first = block * 4 & 4;
+            for (uint32_t x = first, bits = tile.surface[row] >> first & 15; bits; ++x, bits >>= 1)
+                if (bits & 1) work(x + 8 * row);
+        }
 }
 
 /// Appends the patches of a cell to the batch: mean of their crossings, and a normal from the signs.
@@ -124,7 +128,7 @@ void write3(const Stream& stream, uint32_t index, const float v[3]) {
 void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, uint32_t first_vertex) {
     const bool moving = m.input.velocity && m.input.target && m.input.target->velocity.data;
     float* velocity = moving ? s.velocity : nullptr;
-    for_batches(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
+    with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
         m.access.evaluate_gradient(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
                                    batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
                                    velocity);
@@ -155,6 +159,7 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
 
 void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
     uint32_t n = 0, done = 0;
+    list_candidates(m, s, tile);
     for_surface_cells(tile, [&](uint32_t cell) {
         const CellPattern pattern = pattern_at(m, tile, cell);
         s.pattern[cell] = pattern, s.vertex[cell] = uint16_t(done + n);

@@ -95,6 +95,7 @@ void seed_drop(Mesher& m, uint32_t i) {
 /// is nearest to. A guess is enough: the march finds what is missed.
 void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const surface::Field& f = *m.input.field;
+    const surface::Patch& q = f.patches[i];
     const float cells = 1 / tile.cell, radius = disc_share * f.support[i] * cells + 0.5f;
     const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
     float at[3];  // in cells of this tile
@@ -121,9 +122,8 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
             r[u] = float(cell[u]) + 0.5f - at[u], r[v] = float(cell[v]) + 0.5f - at[v];
             r[axis] = slope_u * r[u] + slope_v * r[v];  // in the plane; then by the quadratic above it
             if (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > radius * radius) continue;
-            const float above =
-                f.qxx[i] * r[0] * r[0] + f.qyy[i] * r[1] * r[1] + f.qzz[i] * r[2] * r[2] +
-                2 * (f.qxy[i] * r[0] * r[1] + f.qxz[i] * r[0] * r[2] + f.qyz[i] * r[1] * r[2]);
+            const float above = q.xx * r[0] * r[0] + q.yy * r[1] * r[1] + q.zz * r[2] * r[2] +
+                                q.xy * r[0] * r[1] + q.xz * r[0] * r[2] + q.yz * r[1] * r[2];
             const float middle = at[axis] + r[axis] + bend * above;
             const int last = int(std::clamp(std::floor(middle + half), -1.f, 7.f));
             cell[axis] = int(std::clamp(std::floor(middle - half), 0.f, 8.f));
@@ -132,17 +132,8 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
 }
 
 void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
-    surface::Box box;
-    const float size = tile_cells * tile.cell;
-    for (int a = 0; a < 3; ++a)
-        box.lower[a] = float(tile.coord[a]) * size, box.upper[a] = float(tile.coord[a] + 1) * size;
-    const uint32_t count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
-    for (uint32_t c = 0; c < std::min(count, s.most_candidates); ++c)
+    for (uint32_t c = 0; c < std::min(s.candidate_count, s.most_candidates); ++c)
         if (s.candidates[c] < m.input.field->point_count) draw_disc(m, tile, s.candidates[c]);
-}
-
-float corner_at(const Tile& tile, uint32_t axis, uint32_t corner) {
-    return float(tile_cells * tile.coord[axis] + int32_t(corner)) * tile.cell;
 }
 
 /// Evaluates the corners of the pending cells that are not known yet.
@@ -176,7 +167,7 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
             }
     }
     s.corners_evaluated += n;
-    for_batches(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
+    with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
         m.access.evaluate(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
                           s.value + first);
     });
@@ -363,6 +354,7 @@ void run_march(void* mesher, uint32_t task, uint32_t worker) {
     for_tiles(task, tiles_per_march_task, m.active_count, [&](uint32_t i) {
         Tile& tile = m.tiles[m.active[i]];
         std::memset(tile.cross, 0, sizeof(tile.cross));
+        list_candidates(m, s, tile);
         if (!tile.seeded) draw_discs(m, s, tile);
         tile.seeded = true;
         borrow_corners(m, tile);

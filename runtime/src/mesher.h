@@ -52,7 +52,7 @@ struct Tile {
 /// `slot` travels with each position.
 struct MesherScratch {
     static constexpr uint32_t capacity = corners_per_tile, most_candidates = 1024;
-    uint32_t candidates[most_candidates];
+    uint32_t candidates[most_candidates], candidate_count;  ///< of the tile; a count beyond most_candidates: no list
     float x[capacity], y[capacity], z[capacity];
     uint16_t slot[capacity];
     float value[capacity], gx[capacity], gy[capacity], gz[capacity], velocity[3 * capacity];
@@ -104,7 +104,6 @@ struct Mesher {
     MesherScratch* scratch;      ///< one per worker
 };
 
-inline constexpr uint32_t positions_per_batch = 64;
 /// Tiles a task takes: a tile alone is too little work for an engine's job.
 inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16;
 constexpr uint32_t tasks_of(uint32_t tiles, uint32_t per_task) { return (tiles + per_task - 1) / per_task; }
@@ -121,6 +120,7 @@ uint32_t find_tile(const Mesher& m, int32_t level, const int32_t coord[3]) noexc
 uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
 /// The leaf that holds a position; false when that is out of reach.
 bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t coord[3]) noexcept;
+float corner_at(const Tile& tile, uint32_t axis, uint32_t corner) noexcept;
 /// Puts it into the list of the coming round.
 void queue_tile(Mesher& m, uint32_t tile) noexcept;
 /// Fills m.order with the tiles that have surface.
@@ -163,10 +163,13 @@ uint32_t prepare_quads(void* mesher);
 void run_quads(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_ranges(void* mesher);
 
-/// Work(candidates, count, first, n) for positions [first, first + n) of the scratch. A box with too many
-/// candidates is halved down to one position, whose list is then cut: still a pure function of it.
+/// Lists what may matter to any position of the tile.
+void list_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept;
+
+/// Work(candidates, count, first, n) for positions [first, first + n) of the scratch, whose box is halved until its
+/// candidates fit; those of a single position are then cut: still a pure function of it.
 template <typename Work>
-void with_candidates(const Mesher& m, MesherScratch& s, uint32_t first, uint32_t n, Work&& work) {
+void halve_until_listed(const Mesher& m, MesherScratch& s, uint32_t first, uint32_t n, Work&& work) {
     if (n == 0) return;
     surface::Box box;
     const float* p[3] = {s.x + first, s.y + first, s.z + first};
@@ -198,16 +201,17 @@ void with_candidates(const Mesher& m, MesherScratch& s, uint32_t first, uint32_t
         swap(s.slot[i], s.slot[split]), ++split;
     }
     if (split == first || split == first + n) split = first + n / 2;  // rounding left one side empty
-    with_candidates(m, s, first, split - first, work);
-    with_candidates(m, s, split, first + n - split, work);
+    halve_until_listed(m, s, first, split - first, work);
+    halve_until_listed(m, s, split, first + n - split, work);
 }
 
-/// All n positions of the scratch, in batches with lists of their own: evaluation costs positions times
-/// candidates, so a list should hold few that matter to none of its positions.
+/// The same for the first n positions of the scratch, all in the tile that was listed last.
 template <typename Work>
-void for_batches(const Mesher& m, MesherScratch& s, uint32_t n, Work&& work) {
-    for (uint32_t first = 0; first < n; first += positions_per_batch)
-        with_candidates(m, s, first, n - first < positions_per_batch ? n - first : positions_per_batch, work);
+void with_candidates(const Mesher& m, MesherScratch& s, uint32_t n, Work&& work) {
+    if (s.candidate_count > s.most_candidates)
+        halve_until_listed(m, s, 0, n, work);
+    else if (n)
+        work(s.candidates, s.candidate_count, 0, n);
 }
 
 }  // namespace rill

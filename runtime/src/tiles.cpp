@@ -128,6 +128,17 @@ uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) n
     return m.tile_count - 1;
 }
 
+float corner_at(const Tile& tile, uint32_t axis, uint32_t corner) noexcept {
+    return float(tile_cells * tile.coord[axis] + int32_t(corner)) * tile.cell;
+}
+
+void list_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept {
+    surface::Box box;
+    for (uint32_t a = 0; a < 3; ++a)
+        box.lower[a] = corner_at(tile, a, 0), box.upper[a] = corner_at(tile, a, tile_cells);
+    s.candidate_count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
+}
+
 void queue_tile(Mesher& m, uint32_t index) noexcept {
     Tile& tile = m.tiles[index];
     if (tile.queued) return;

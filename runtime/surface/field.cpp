@@ -12,6 +12,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "surface/field_kernels.h"
+
 namespace rill::surface {
 namespace {
 
@@ -44,10 +46,13 @@ struct Carver {
 };
 
 void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
-    float** arrays[] = {&field.x,   &field.y,   &field.z,   &field.nx,      &field.ny,      &field.nz,
-                        &field.qxx, &field.qyy, &field.qzz, &field.qxy,     &field.qxz,     &field.qyz,
-                        &field.vx,  &field.vy,  &field.vz,  &field.support, &field.activity, &field.area};
-    for (float** array : arrays) *array = carver.take<float>(points);
+    field.patches = carver.take<Patch>(points);
+    float** arrays[] = {&field.x,  &field.y,  &field.z,  &field.nx,      &field.ny,       &field.nz,
+                        &field.vx, &field.vy, &field.vz, &field.support, &field.activity, &field.area, &field.steep};
+    for (float** array : arrays) {
+        *array = carver.take<float>(points + lanes);  // kernels read whole batches
+        std::fill(*array, *array + points + lanes, 0.f);
+    }
     field.source = carver.take<uint32_t>(points);
     float** drop_arrays[] = {&field.dx, &field.dy, &field.dz, &field.dvx, &field.dvy, &field.dvz,
                              &field.radius, &field.reach, &field.drop_activity};
@@ -274,13 +279,16 @@ void fit_patch(Field& f, uint32_t i) {
         if (bend * support > most_bend)
             for (float& q : quadratic) q *= most_bend / (bend * support);
     }
-    const float *s = frame.t1, *t = frame.t2, a = quadratic[0], b = 0.5f * quadratic[1], c = quadratic[2];
-    f.qxx[i] = a * s[0] * s[0] + 2 * b * s[0] * t[0] + c * t[0] * t[0];
-    f.qyy[i] = a * s[1] * s[1] + 2 * b * s[1] * t[1] + c * t[1] * t[1];
-    f.qzz[i] = a * s[2] * s[2] + 2 * b * s[2] * t[2] + c * t[2] * t[2];
-    f.qxy[i] = a * s[0] * s[1] + b * (s[0] * t[1] + s[1] * t[0]) + c * t[0] * t[1];
-    f.qxz[i] = a * s[0] * s[2] + b * (s[0] * t[2] + s[2] * t[0]) + c * t[0] * t[2];
-    f.qyz[i] = a * s[1] * s[2] + b * (s[1] * t[2] + s[2] * t[1]) + c * t[1] * t[2];
+    const float *s = frame.t1, *t = frame.t2, a = quadratic[0], b = quadratic[1], c = quadratic[2];
+    f.steep[i] = 1 / (support * support);
+    f.patches[i] = {f.x[i], f.y[i], f.z[i], f.nx[i], f.ny[i], f.nz[i],
+                    a * s[0] * s[0] + b * s[0] * t[0] + c * t[0] * t[0],
+                    a * s[1] * s[1] + b * s[1] * t[1] + c * t[1] * t[1],
+                    a * s[2] * s[2] + b * s[2] * t[2] + c * t[2] * t[2],
+                    2 * a * s[0] * s[1] + b * (s[0] * t[1] + s[1] * t[0]) + 2 * c * t[0] * t[1],
+                    2 * a * s[0] * s[2] + b * (s[0] * t[2] + s[2] * t[0]) + 2 * c * t[0] * t[2],
+                    2 * a * s[1] * s[2] + b * (s[1] * t[2] + s[2] * t[1]) + 2 * c * t[1] * t[2],
+                    f.steep[i], f.activity[i], 1 / f.activity[i], 0};
 }
 
 void close_cluster(Field& f, Cluster& k) {
@@ -330,7 +338,7 @@ void build_clusters(Field& f) {
 }  // namespace
 
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
-    return 18 * aligned(points * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
+    return aligned(points * sizeof(Patch)) + 13 * aligned((points + lanes) * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
            15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t)) +
            aligned(cluster_capacity(points) * sizeof(Cluster));
 }
@@ -338,6 +346,7 @@ size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
 void begin_field(Field& field, void* memory, const format::PointSet& points,
                  const format::DropSet& drops) noexcept {
     field = {};
+    field.kernels = &best_kernels();
     carve(field, {static_cast<uint8_t*>(memory)}, points.count, drops.count);
     lay_grid(field, points);
     sort_points(field, points);

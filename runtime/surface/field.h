@@ -30,14 +30,25 @@ struct Cluster {
     uint32_t first, last;      ///< into Field::cluster_member
 };
 
+struct Kernels;
+
+/// What evaluation reads of a point: one cache line.
+struct alignas(64) Patch {
+    float x, y, z, nx, ny, nz;
+    float xx, yy, zz, xy, xz, yz;  ///< of Q; the mixed ones doubled
+    float inverse;                 ///< 1 / R²
+    float activity, recede;        ///< and 1 / activity: a point that fades recedes
+    float unused;
+};
+
 /// All memory is the caller's: one block of field_bytes(), 64-byte aligned.
 struct Field {
     // Points sorted by grid cell (ties by input index), and their local quadratics.
     uint32_t point_count, drop_count;
+    Patch* patches;
     float *x, *y, *z;                      ///< position
     float *nx, *ny, *nz;                   ///< normal of the patch (unit)
-    float *qxx, *qyy, *qzz, *qxy, *qxz, *qyz;  ///< Γ = d + n·r + rᵀQr, Q acts in the tangent plane
-    float* support;                        ///< radius R_i beyond which the patch has no weight
+    float *support, *steep;                ///< radius R_i beyond which the patch has no weight, and 1 / R_i²
     float* activity;
     float* area;                           ///< that the point stands for, over 4π, for the winding number
     float *vx, *vy, *vz;
@@ -51,6 +62,7 @@ struct Field {
     Cluster* clusters;
     uint32_t* cluster_member;              ///< sorted points, cluster by cluster
     uint32_t cluster_count;
+    const Kernels* kernels;                ///< what evaluation runs on
     float largest_support, largest_reach;  ///< over points; over drops
     float lower[3], upper[3];              ///< of everything with weight
 };

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// The rules of the blend, shared by the kernels and what calls them.
+//
+// At x the nearest point's normal splits the patches in two clusters: A agrees with it, B opposes it. Each
+// cluster is blended on its own; where both have weight the liquid between them is thin (the clusters face
+// away from each other: intersection, max) or the air is (they face each other: union, min). Plain blending
+// is 5–20 times worse where the thickness is below 1.5 point spacings.
+//
+// Away from points the winding number of all points gives the sign. Tried on a splash (p99 of the worst frame, % of
+// the diagonal): round supports and the nearest plane's sign 10.8; flattened supports 0.28 with stray scraps of 4 %;
+// with patches of other faces fading out and the winding number 0.28 without scraps.
+#pragma once
+
+namespace rill::surface {
+
+// u² = (|r|² + flatten · (n·r)²) / R²: a patch reaches half as far along its normal as along the surface, or the
+// wide patches of a calm far side would speak for fine surface nearby.
+constexpr float flatten = 3;
+// Where the nearest point is farther (in u²) than `trusted`, the winding number may overrule the blend if it is sure;
+// farther than `core` it need not even disagree.
+constexpr float core = 0.3f, trusted = 0.08f;
+constexpr float sure = 0.2f, likely = 0.35f;  // of the winding number, from 0 or 1: to overrule within and beyond core
+constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
+constexpr float agreeing = 0.7f;        // above this: full weight in A; between, patches of another face fade out
+constexpr float gate_scale = 1 / (agreeing - opposed);
+constexpr float opposed_reach = 0.51f;  // (1/1.4)²: cluster B has weight only within R/1.4
+constexpr float soften = 1e-4f;         // of u² in the weight
+constexpr float from_afar = 5;          // of radius²: clusters farther than this count as one disc
+
+}  // namespace rill::surface
