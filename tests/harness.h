@@ -151,6 +151,7 @@ struct Clip {
     bool uneven = false;               ///< frame times, steps of 0.9 … 1.1 of even
     bool drop = false;                 ///< one drop beside the ball
     uint32_t across = 0;               ///< blocks are so many cubed boxes of the ball; 0: two halves, wide bounds
+    float cell = 0.08f;                ///< the source's
     std::string settings = "{\"made\":\"by the tests\"}";
 
     static constexpr double fps = 24;
@@ -270,7 +271,7 @@ inline rill::cooker::AssetFacts ball_facts(const Clip& clip) {
     facts.layer_count = clip.layers;
     facts.frames_per_second = Clip::fps;
     for (uint32_t f = 0; clip.uneven && f < clip.frames; ++f) facts.frame_seconds.push_back(clip.seconds(f));
-    facts.cell_size = 0.08f;
+    facts.cell_size = clip.cell;
     facts.lower = {-1.5f, -1.1f, -1.1f};
     facts.upper = {1.5f, clip.drop ? 3.3f : 1.1f, 1.1f};
     facts.settings_json = clip.settings;

@@ -197,7 +197,6 @@ void run_counts(void* mesher, uint32_t task, uint32_t) {
 
 uint32_t prepare_vertices(void* mesher) {
     Mesher& m = *static_cast<Mesher*>(mesher);
-    lay_out(m);
     return tasks_of(m.kept, tiles_per_march_task);
 }
 

@@ -4,6 +4,7 @@
 // nobody stores the tree, and every task finds the same one.
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace rill {
@@ -38,6 +39,16 @@ struct Levels {
             if (squared < limit * limit) return true;
         }
         return false;
+    }
+    /// Cells 2^octaves times as large, wherever the eyes allow no more by distance: the smallest, too.
+    void coarsen(float octaves) {
+        float left = octaves;
+        for (uint32_t e = 0; e < eye_count; ++e) {
+            const float room = std::log2(reach[e] / least_reach), used = std::min(octaves, room);
+            reach[e] = std::max(reach[e] * std::exp2(-used), least_reach);
+            left = std::min(left, octaves - used);
+        }
+        cell_size *= std::exp2(std::ceil(left - 0.01f));
     }
     /// The coarsest level there is: the whole world in one tile is of no use.
     int32_t coarsest() const { return eye_count ? most_levels : 0; }

@@ -183,8 +183,15 @@ void lay_out(Mesher& m) noexcept {
             std::max<uint64_t>(vertices, 2 * uint64_t(m.limits.vertices));  // unknown: ask for twice the room
     }
     const auto counted = [](uint64_t n) { return uint32_t(std::min<uint64_t>(n, ~0u)); };
-    m.vertices_wanted = counted(vertices), m.indices_wanted = counted(indices),
-    m.ranges_wanted = counted(ranges);
+    m.vertices_found = counted(vertices);
+    m.vertices_wanted = std::max(m.vertices_wanted, counted(vertices));
+    m.indices_wanted = std::max(m.indices_wanted, counted(indices));
+    m.ranges_wanted = std::max(m.ranges_wanted, counted(ranges));
+    // An octave quarters all of them, more or less.
+    const auto excess = [](uint64_t wanted, uint64_t most) {
+        return wanted > most && most ? 0.5f * std::log2(float(wanted) / float(most)) + 0.05f : 0.f;
+    };
+    m.too_large = std::max({excess(vertices, most_vertices), excess(indices, most_indices), excess(ranges, most_ranges)});
 }
 
 uint32_t prepare_quads(void* mesher) {

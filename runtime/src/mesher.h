@@ -82,12 +82,18 @@ struct OrderedTile {
     static constexpr uint32_t group_shift = 6;  ///< key >> group_shift names the group
 };
 
+enum class MeshPhase : uint8_t { march, counts, vertices, quads, ranges, done };
+
 struct Mesher {
     MeshLimits limits;
     MeshInput input;
     FieldAccess access;
     uint32_t cut;
-    uint32_t vertices_wanted, indices_wanted, ranges_wanted;
+    uint32_t vertices_wanted, indices_wanted, ranges_wanted;  ///< the most of all attempts
+    uint32_t vertices_found;   ///< by this attempt
+    float octaves, too_large;  ///< given up; how many too few those were, found by lay_out()
+    MeshPhase phase;
+    void (*run)(void* mesher, uint32_t task, uint32_t worker);  ///< of the tasks that are out
 
     Tile* tiles;
     uint32_t tile_count;
@@ -157,7 +163,7 @@ uint32_t count_indices(const Mesher& m, Tile& tile) noexcept;
 void cover(Tile& tile, const float position[3]) noexcept;
 /// Split a quad along 0–2 (else 1–3): the shorter, unless only the other keeps both triangles facing one way.
 bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept;
-/// Prefix sums over the order, cut at the capacities.
+/// Prefix sums over the order, cut at the capacities. Sets too_large.
 void lay_out(Mesher& m) noexcept;
 uint32_t prepare_quads(void* mesher);
 void run_quads(void* mesher, uint32_t task, uint32_t worker);

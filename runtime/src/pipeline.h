@@ -3,6 +3,7 @@
 //
 //   file → directory                        asset_to_directory.cpp      once, in poll()
 //   time, views, directory → plan, wants    view_to_wants.cpp           begin_frame()
+//   plan, time there is → detail            frame_budget.cpp            begin_frame()
 //   wants → reads                           wants_to_reads.cpp          begin_frame(): residency, eviction
 //   reads → chunks                          reads_to_chunks.cpp         completions; decoding in tasks
 //   chunks → points                         chunks_to_points.cpp        tasks, over coefficients_to_points.h
@@ -115,9 +116,8 @@ struct Want {
     float seconds_until_needed;    ///< real seconds
 };
 struct Detail {
-    float cell_size;               ///< the smallest in sight, asset space
     uint32_t layers;               ///< longest prefix wanted of any block
-    float pixel_error;             ///< what cell_size comes to on the screen, at its nearest; 0: no view
+    float pixels_per_metre;        ///< where what is seen is nearest; 0: no view
 };
 struct Plan {
     Moment moment;
@@ -126,7 +126,8 @@ struct Plan {
     uint32_t view_count;
     FrustumPlanes views[most_views];   ///< asset space
     float eyes[most_views][3];         ///< asset space
-    Levels levels;                 ///< kept from frame to frame while the views hardly move (hysteresis)
+    Levels levels;                 ///< as asked; kept from frame to frame while the views hardly move (hysteresis)
+    Levels levels_drawn;           ///< with the detail given up for the sake of time
     Detail detail;
     uint32_t blocks_in_view;
     uint32_t now_count, want_count;    ///< wants[0, now_count) are of this moment, the rest is prefetch
@@ -139,8 +140,10 @@ Moment moment_at(const Directory& directory, double seconds) noexcept;
 /// Real seconds until `window` is needed by the play direction, round the end if the clip loops; what lies behind
 /// comes after all that is ahead.
 float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept;
-/// Fills everything but Plan::wants' address. `coarser`: levels to add for the sake of time.
-void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept;
+/// Of what is in sight of this moment; the largest if nothing is.
+float smallest_cell(const Directory& directory, const Plan& plan, const Levels& levels) noexcept;
+/// Fills everything but Plan::wants' address.
+void plan_frame(const Directory& directory, const Frame& frame, Plan& plan) noexcept;
 
 // ---- plan → reads → chunks ------------------------------------------------------------------------
 
@@ -179,6 +182,7 @@ struct Residency {
     uint32_t slot_count, slots_out;
     uint32_t* to_decode;           ///< arrived chunks that this frame decodes
     uint32_t decode_count;
+    uint64_t decode_bytes;         ///< of those
     uint64_t frame_number;
     uint64_t frame_bytes_asked;
     bool waiting;                  ///< Frame::wait_for_data: failed reads are repeated at once
@@ -200,8 +204,9 @@ bool collect_reads(Residency& residency, const Directory& directory) noexcept;
 /// Nothing of this moment can still arrive by waiting.
 bool is_settled(const Residency& residency, const Plan& plan) noexcept;
 void forget_reads(Residency& residency) noexcept;
-/// Chooses what this frame decodes: all of this moment, and some of the prefetch.
-void choose_decodes(Residency& residency, const Plan& plan) noexcept;
+/// Chooses what this frame decodes: of this moment what `most_bytes` allows, one chunk at least, and some of the
+/// prefetch.
+void choose_decodes(Residency& residency, const Directory& directory, const Plan& plan, uint64_t most_bytes) noexcept;
 /// One task per chunk; context Player.
 extern const Stage decode_stage;
 /// After the frame: staging back to the heap, faults counted and logged.
@@ -231,6 +236,27 @@ struct Evaluation {
 inline constexpr uint32_t evaluate_stage_count = 2;
 extern const Stage evaluate_stages[evaluate_stage_count];  ///< context Player
 
+// ---- plan, time there is → detail -----------------------------------------------------------------
+
+/// Of detail, that may be given up: what then is left of the liquid is some cells across.
+float most_octaves(const Directory& directory) noexcept;
+/// What work takes here, learned from frames with Budget::microseconds; starts wary.
+struct Pace {
+    float octaves = 0;             ///< given up before the frame begins
+    float us_per_vertex = 1, us_per_point = 4, us_per_byte = 1, vertices_per_cell = 1.5f;
+    float cells = 0, points = 0;   ///< estimated of this frame
+    uint32_t lates = 0;            ///< how often the mesher has been told that it is late
+};
+uint64_t read_clock(const Host& host) noexcept;
+/// 0 when this frame has no time cap.
+uint64_t microseconds_now(const Player& player) noexcept;
+/// After plan_frame(): sets Pace::octaves and Plan::levels_drawn.
+void give_up_detail(Player& player) noexcept;
+/// MeshInput::late.
+bool is_late(void* player) noexcept;
+uint64_t decode_bytes_affordable(const Player& player) noexcept;
+void learn_pace(Player& player, const MeshCounts& mesh, uint64_t bytes_decoded) noexcept;
+
 // ---- points → field → mesh ------------------------------------------------------------------------
 
 inline constexpr uint32_t field_stage_count = 2;
@@ -253,7 +279,7 @@ struct rill::Player {
     void* field_memory;
     rill::Mesher* mesher;
     rill::Relay relay;
-    uint32_t coarser;                  ///< levels given up for Budget::microseconds
+    rill::Pace pace;
     /// A stage that only reads the clock, and only when there is a time cap.
     struct Mark {
         Player* player;
@@ -266,7 +292,7 @@ namespace rill {
 
 // ---- frame → stats ----------------------------------------------------------------------------------
 
-/// After the last stage and settle_decodes(). Also steers Player::coarser.
+/// After the last stage and settle_decodes(). Also learns the pace.
 Stats count_all(Player& player) noexcept;
 
 }  // namespace rill

@@ -81,7 +81,7 @@ Sight look(const Directory& directory, const Plan& plan) {
     return sight;
 }
 
-Levels levels_asked(const Directory& directory, const Frame& frame, uint32_t coarser, const Plan& plan) {
+Levels levels_asked(const Directory& directory, const Frame& frame, const Plan& plan) {
     Levels levels{};
     levels.cell_size = frame.budget.cell_size > 0 ? frame.budget.cell_size : directory.header.cell_size;
     // A cell so small that the clip cannot be counted in cells is a mistake that costs nothing to survive.
@@ -90,12 +90,7 @@ Levels levels_asked(const Directory& directory, const Frame& frame, uint32_t coa
         across = std::max(across, directory.header.upper[a] - directory.header.lower[a]);
     levels.cell_size = std::max(levels.cell_size, across / most_cells_across);
     if (frame.budget.cell_size > 0) return levels;
-    if (!plan.view_count) {
-        levels.cell_size *= float(1u << coarser);
-        return levels;
-    }
-    const float asked = frame.budget.pixel_error > 0 ? frame.budget.pixel_error : automatic_pixel_error;
-    const float pixels = asked * float(1u << coarser);
+    const float pixels = frame.budget.pixel_error > 0 ? frame.budget.pixel_error : automatic_pixel_error;
     levels.eye_count = plan.view_count;
     for (uint32_t v = 0; v < plan.view_count; ++v) {
         std::copy(plan.eyes[v], plan.eyes[v] + 3, levels.eyes[v]);
@@ -125,24 +120,16 @@ uint32_t layers_for(const Directory& directory, const Frame& frame, float cell_s
     return frame.budget.layers ? std::min(layers, frame.budget.layers) : layers;
 }
 
-void choose_detail(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) {
+void choose_detail(const Directory& directory, const Frame& frame, Plan& plan) {
     const Sight sight = look(directory, plan);
-    const Levels asked = levels_asked(directory, frame, coarser, plan);
+    const Levels asked = levels_asked(directory, frame, plan);
     if (!alike(plan.levels, asked, sight)) plan.levels = asked;
-    float smallest = 1e15f, per_metre = 0;
-    const format::WindowRecord& w = directory.tables.windows[plan.moment.window];
-    for (uint32_t k = 0; k < w.chunk_count; ++k) {
-        const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
-        if (is_seen(plan, chunk)) smallest = std::min(smallest, cell_at(plan.levels, chunk));
-    }
+    plan.levels_drawn = plan.levels;
+    plan.detail = {};
     for (uint32_t v = 0; v < plan.view_count; ++v)
         if (sight.nearest[v] < 1e15f)
-            per_metre = std::max(per_metre, frame.views[v].pixels_per_radian / sight.nearest[v]);
-    Detail& detail = plan.detail;
-    detail = {plan.levels.cell_size, 0, 0};
-    // The largest power of two that fits: what Levels::divided() comes to.
-    while (smallest < 1e15f && 2 * detail.cell_size <= smallest) detail.cell_size *= 2;
-    detail.pixel_error = detail.cell_size * per_metre;
+            plan.detail.pixels_per_metre =
+                std::max(plan.detail.pixels_per_metre, frame.views[v].pixels_per_radian / sight.nearest[v]);
 }
 
 /// What is wanted of a window's blocks: the nearer, the more layers. A prefix, for all of a block.
@@ -247,6 +234,17 @@ Moment moment_at(const Directory& directory, double seconds) noexcept {
     return moment;
 }
 
+float smallest_cell(const Directory& directory, const Plan& plan, const Levels& levels) noexcept {
+    const format::WindowRecord& w = directory.tables.windows[plan.moment.window];
+    float smallest = levels.cell(levels.coarsest()), cell = levels.cell_size;
+    for (uint32_t k = 0; k < w.chunk_count; ++k) {
+        const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
+        if (is_seen(plan, chunk)) smallest = std::min(smallest, cell_at(levels, chunk));
+    }
+    while (2 * cell <= smallest) cell *= 2;  // the largest power of two that fits: what Levels::divided() comes to
+    return cell;
+}
+
 float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept {
     constexpr double behind = 1e6;  // after everything ahead
     if (window == plan.moment.window) return 0;
@@ -264,12 +262,12 @@ float seconds_until(const Directory& directory, const Plan& plan, uint32_t windo
     return float(later == (plan.rate > 0) ? real : behind + real);
 }
 
-void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept {
+void plan_frame(const Directory& directory, const Frame& frame, Plan& plan) noexcept {
     plan.moment = moment_at(directory, frame.seconds);
     plan.rate = frame.rate;
     plan.loops = frame.loops;
     take_views(frame, plan);
-    choose_detail(directory, frame, coarser, plan);
+    choose_detail(directory, frame, plan);
     plan.blocks_in_view = count_blocks_in_view(directory, plan);
     list_wants(directory, frame, plan);
 }
