@@ -202,6 +202,7 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return source_->name(index); }
+    std::vector<std::filesystem::path> files(size_t index) const override { return source_->files(index); }
     Mesh read_surface(size_t index) const override { return source_->read_surface(index); }
     Mesh read(size_t index) const override {
         Mesh mesh = source_->read(index);

@@ -264,6 +264,21 @@ void AssetWriter::add_window(uint32_t first_sample, uint32_t sample_count, uint3
     }
 }
 
+void AssetWriter::append(const AssetDirectory& part, uint32_t first_sample) {
+    const uint32_t first_chunk = uint32_t(impl_->chunks.size());
+    for (format::WindowRecord window : part.windows) {
+        window.first_sample += first_sample, window.first_chunk += first_chunk;
+        impl_->windows.push_back(window);
+    }
+    for (uint32_t c = 0; c < part.chunks.size(); ++c) {
+        const std::vector<uint8_t> bytes = read_chunk(part, c);
+        impl_->chunks.push_back(part.chunks[c]);
+        impl_->chunks.back().offset = impl_->spooled;
+        impl_->spool.write(bytes.data(), bytes.size());
+        impl_->spooled += bytes.size();
+    }
+}
+
 void AssetWriter::finish(const AssetFacts& facts) {
     Impl& impl = *impl_;
     const size_t directory_bytes = impl.directory(facts, 0).size();

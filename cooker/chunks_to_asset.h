@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "asset_directory.h"
 #include "format/layout.h"
 #include "layers_to_chunks.h"
 
@@ -38,6 +39,8 @@ public:
     /// Windows in playback order; chunks in any order (sorted here).
     void add_window(uint32_t first_sample, uint32_t sample_count, uint32_t block_count,
                     std::vector<ChunkToWrite> chunks);
+    /// All windows of a finished asset, as they are; its first sample becomes `first_sample`. Throws InputError when damaged.
+    void append(const AssetDirectory& part, uint32_t first_sample);
     /// Writes header, directory, chunks to `path`.partial, syncs, renames. Throws InputError (disk full …).
     void finish(const AssetFacts& facts);
 private:

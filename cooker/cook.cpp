@@ -3,65 +3,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
+#include <set>
 
-#include "check_velocity.h"
-#include "chunks_to_asset.h"
 #include "error_target.h"
 #include "frames_to_tracks.h"
+#include "input_hash.h"
+#include "output_file.h"
 #include "parallel.h"
-#include "verify.h"
+#include "parts_to_asset.h"
+#include "survey.h"
 
 namespace rill::cooker {
+namespace fs = std::filesystem;
 namespace {
 
 constexpr uint32_t most_tracks_per_block = 1500;
 constexpr int most_attempts = 3;
-constexpr size_t judged_frames = 24;  // per attempt, evenly spread
-constexpr double met_within = 0.1;  // of the target
+constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
 constexpr double first_tolerance = 1.15;
-
-/// What must be known of the whole sequence before its first window is cooked.
-struct Survey {
-    glm::vec3 lower{0}, upper{0};
-    float edge = 0;
-    double triangles = 0, vertices = 0;
-    double diagonal() const { return glm::distance(lower, upper); }
-};
-
-Survey survey(const SequenceReader& reader, int jobs, const std::function<void(uint32_t)>& done) {
-    struct Facts {
-        glm::vec3 lower{1e30f}, upper{-1e30f};
-        float edge = 0;
-        size_t triangles = 0, vertices = 0;
-    };
-    std::vector<Facts> facts(reader.info().numbers.size());
-    std::atomic<uint32_t> count{0};
-    parallel_for(facts.size(), jobs, [&](size_t i) {
-        const Mesh mesh = reader.read_surface(i);
-        Facts& f = facts[i];
-        for (const Triangle& t : mesh.triangles)
-            for (uint32_t v : t) f.lower = glm::min(f.lower, mesh.positions[v]), f.upper = glm::max(f.upper, mesh.positions[v]);
-        f.edge = median_edge(mesh), f.triangles = mesh.triangles.size(), f.vertices = mesh.positions.size();
-        done(++count);
-    });
-    Survey result;
-    std::vector<float> edges;
-    glm::vec3 lower(1e30f), upper(-1e30f);
-    for (const Facts& f : facts) {
-        if (f.triangles == 0) continue;
-        lower = glm::min(lower, f.lower), upper = glm::max(upper, f.upper);
-        edges.push_back(f.edge);
-        result.triangles += double(f.triangles), result.vertices += double(f.vertices);
-    }
-    if (edges.empty()) {
-        result.edge = 1;  // nothing to show, and nothing to measure
-        return result;
-    }
-    std::nth_element(edges.begin(), edges.begin() + long(edges.size() / 2), edges.end());
-    result.edge = edges[edges.size() / 2], result.lower = lower, result.upper = upper;
-    return result;
-}
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
@@ -72,12 +33,6 @@ WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     goal.jobs = jobs;
     return goal;
 }
-
-struct Account {
-    ChunkBits bits;
-    uint64_t tracks = 0, point_frames = 0;
-    std::vector<double> layer_bytes;
-};
 
 void add(ChunkBits& sum, const ChunkBits& more) {
     sum.structure += more.structure, sum.births += more.births, sum.motion += more.motion;
@@ -124,8 +79,19 @@ std::vector<LayerError> layer_errors(const Window& window, const CodedWindow& co
     return errors;
 }
 
-void write_window(AssetWriter& writer, const Window& window, const CodedWindow& coded, const WindowGoal& goal,
-                  uint32_t layers, Account& account) {
+/// Tracks that end here, by how long they lived and why.
+void count_lives(SpanResult& account, const Window& window, bool ends_span) {
+    account.deaths.resize(std::size(death_names));
+    for (const Path& path : window.paths) {
+        if (path.cause == Death::none && !ends_span) continue;
+        const size_t life = size_t(path.age + path.death - path.birth + 1);
+        if (account.lives.size() <= life) account.lives.resize(life + 1);
+        ++account.lives[life], ++account.deaths[size_t(path.cause)];
+    }
+}
+
+void write_window(AssetWriter& writer, uint32_t first_sample, const Window& window, const CodedWindow& coded, const WindowGoal& goal,
+                  uint32_t layers, bool ends_span, SpanResult& account) {
     const std::vector<uint32_t> layer = assign_layers(window, layers);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(window, most_tracks_per_block, block_count);
@@ -153,172 +119,333 @@ void write_window(AssetWriter& writer, const Window& window, const CodedWindow& 
     }
     account.tracks += window.paths.size();
     for (const Path& path : window.paths) account.point_frames += uint64_t(path.death - path.birth + 1);
-    writer.add_window(uint32_t(window.first), uint32_t(window.samples()), block_count, std::move(chunks));
+    count_lives(account, window, ends_span);
+    writer.add_window(first_sample, uint32_t(window.samples()), block_count, std::move(chunks));
 }
 
-nlohmann::json settings_json(const CookSettings& settings, const SequenceInfo& info, const Survey& facts, double target,
-                             const Account& account) {
-    const double frames = double(info.numbers.size());
-    const auto bytes = [](double bits) { return std::round(bits / 8); };
-    return {{"generator", "rill cook"},
-            {"settings", {{"error", settings.error}, {"window", settings.window}, {"layers", settings.layers}}},
-            {"target", {{"p99_metres", target}}},
-            {"source",
-             {{"format", info.format}, {"frames", info.numbers.size()}, {"first_frame", info.numbers.front()},
-              {"frames_per_second", info.frames_per_second}, {"raw_bytes", info.raw_bytes},
-              {"triangles_per_frame", facts.triangles / frames}, {"vertices_per_frame", facts.vertices / frames},
-              {"median_edge_metres", facts.edge}}},
-            {"bytes",
-             {{"structure", bytes(account.bits.structure)}, {"births", bytes(account.bits.births)},
-              {"motion", bytes(account.bits.motion)}, {"normals", bytes(account.bits.normals)},
-              {"drops", bytes(account.bits.drops)}}},
-            {"layer_bytes", account.layer_bytes},
-            {"tracks", account.tracks},
-            {"points_per_frame", double(account.point_frames) / std::max(1.0, frames)}};
-}
-
-class Cook {
+/// Some frames of a sequence.
+class ChosenFrames : public SequenceReader {
 public:
-    Cook(const SequenceReader& reader, const CookSettings& settings, const Survey& facts, double target,
-         const std::function<void(const CookProgress&)>& progress)
-        : reader_(reader), settings_(settings), facts_(facts), target_(target), progress_(progress) {
-        tables_memory_.resize(format::basis_tables_bytes(uint32_t(settings.window) + 1) / sizeof(double) + 2);
-        format::build_basis_tables(tables_, tables_memory_.data(), uint32_t(settings.window) + 1);
+    ChosenFrames(const SequenceReader& source, std::vector<size_t> chosen) : source_(source), info_(source.info()), chosen_(std::move(chosen)) {
+        info_.numbers.clear(), info_.seconds.clear();
+        for (size_t i : chosen_) info_.numbers.push_back(source.info().numbers[i]), info_.seconds.push_back(source.info().seconds[i]);
     }
-
-    nlohmann::json run(const std::string& output, double tolerance, const std::string& stage) {
-        const WindowGoal goal = goal_for(tolerance, facts_, settings_.jobs);
-        const uint32_t frames = uint32_t(reader_.info().numbers.size()), layers = uint32_t(settings_.layers);
-        AssetWriter writer(output);
-        Account account;
-        std::vector<Path> survivors;
-        std::shared_ptr<const SurfaceFrame> border;
-        for (uint32_t first = 0;; first += uint32_t(settings_.window)) {
-            Window window = load(first, std::min(frames - 1, first + uint32_t(settings_.window)), border);
-            grow_tracks(window, survivors, goal);
-            const CodedWindow coded = code_tracks(window, goal, tables_);
-            write_window(writer, window, coded, goal, layers, account);
-            survivors = survivors_of(window);
-            border = window.frames.back();
-            progress_({first + uint32_t(window.samples()), frames, stage});
-            if (window.ends_clip) break;
-        }
-        const nlohmann::json json = settings_json(settings_, reader_.info(), facts_, target_, account);
-        writer.finish(asset_facts(json));
-        return json;
-    }
+    const SequenceInfo& info() const override { return info_; }
+    std::string name(size_t index) const override { return source_.name(chosen_.at(index)); }
+    std::vector<fs::path> files(size_t index) const override { return source_.files(chosen_.at(index)); }
+    Mesh read(size_t index) const override { return source_.read(chosen_.at(index)); }
+    Mesh read_surface(size_t index) const override { return source_.read_surface(chosen_.at(index)); }
 
 private:
-    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border) const {
-        Window window;
-        window.first = int(first), window.opens_clip = first == 0;
-        window.ends_clip = last + 1 == reader_.info().numbers.size();
-        window.frames.resize(last - first + 1);
-        for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
-        parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
-            window.frames[s] = s == 0 && border ? border
-                                                : std::make_shared<SurfaceFrame>(reader_.read(first + s), facts_.edge);
-        });
-        return window;
-    }
-
-    AssetFacts asset_facts(const nlohmann::json& json) const {
-        const SequenceInfo& info = reader_.info();
-        AssetFacts facts;
-        facts.frame_count = uint32_t(info.numbers.size());
-        facts.first_frame = info.numbers.front();
-        facts.frame_step = info.numbers.size() > 1 ? info.numbers[1] - info.numbers[0] : 1;
-        facts.layer_count = uint32_t(settings_.layers);
-        facts.frames_per_second = info.frames_per_second, facts.first_seconds = info.seconds.front();
-        facts.cell_size = facts_.edge, facts.lower = facts_.lower, facts.upper = facts_.upper;
-        facts.settings_json = json.dump();
-        const double step = info.seconds.size() > 1
-                                ? (info.seconds.back() - info.seconds.front()) / double(info.seconds.size() - 1) : 0;
-        const bool even = std::ranges::all_of(info.seconds, [&, i = 0](double s) mutable {
-            return std::abs(s - info.seconds.front() - step * i++) < 1e-6 * std::max(1.0, step);
-        });
-        if (even && step > 0) facts.frames_per_second = 1 / step;
-        if (!even) for (double s : info.seconds) facts.frame_seconds.push_back(s - info.seconds.front());
-        return facts;
-    }
-
-    const SequenceReader& reader_;
-    const CookSettings& settings_;
-    const Survey& facts_;
-    double target_;
-    const std::function<void(const CookProgress&)>& progress_;
-    format::BasisTables tables_{};
-    std::vector<double> tables_memory_;
+    const SequenceReader& source_;
+    SequenceInfo info_;
+    std::vector<size_t> chosen_;
 };
 
-/// The frames an attempt is judged by.
-std::unique_ptr<SequenceReader> spread_frames(const std::string& input, ReadOptions options, const SequenceInfo& info) {
-    const int count = int(info.numbers.size()), own = count > 1 ? info.numbers[1] - info.numbers[0] : 1;
-    const int stride = std::max(1, (count + int(judged_frames) - 1) / int(judged_frames));
-    options.first = info.numbers.front(), options.last = info.numbers.back(), options.step = own * stride;
-    options.last = options.first + (options.last - options.first) / options.step * options.step;
-    return open_sequence(input, options);
-}
-
-/// The attempt under measurement; gone when the cook fails or ends.
-struct PartialFile {
+/// Gone when the work fails or ends.
+struct TemporaryFile {
     std::string path;
-    ~PartialFile() {
+    ~TemporaryFile() {
         std::error_code ignored;
-        std::filesystem::remove(path, ignored);
+        fs::remove(path, ignored);
     }
 };
 
 void move_file(const std::string& from, const std::string& to) {
     std::error_code failed;
-    std::filesystem::rename(from, to, failed);
+    fs::rename(from, to, failed);
     if (failed) throw InputError(to + ": cannot be written: " + failed.message());
 }
+
+/// Cooks spans, each into a part of its own.
+class SpanCook {
+public:
+    SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan, const CookFacts& facts, double target)
+        : reader_(reader), settings_(settings), survey_(survey), plan_(plan), facts_(facts), target_(target) {
+        tables_memory_.resize(format::basis_tables_bytes(uint32_t(settings.window) + 1) / sizeof(double) + 2);
+        format::build_basis_tables(tables_, tables_memory_.data(), uint32_t(settings.window) + 1);
+    }
+
+    /// Closed loop: the span is decoded by the runtime and measured; the tolerance follows. `done`: frames of the first attempt.
+    void run(uint32_t span, const std::string& output, const std::function<void(uint32_t)>& done) const {
+        const TemporaryFile candidate{output + ".cooking"}, best{output + ".best"};
+        const ChosenFrames judged(reader_, judged_frames_of(span));
+        SpanResult kept;
+        double tolerance = first_tolerance * target_, best_miss = HUGE_VAL;
+        for (int attempt = 1;; ++attempt) {
+            SpanResult result = cook(span, candidate.path, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
+            result.measured = verify(candidate.path, judged, settings_.jobs).totals;
+            const double ratio = result.measured.p99() / target_, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
+            if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate.path, best.path);
+            kept.attempts = attempt;
+            if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) break;
+            tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
+        }
+        AssetWriter writer(output);
+        writer.append(read_directory(best.path), 0);
+        write(writer, kept);
+    }
+
+private:
+    /// Evenly spread, as many of every span, so that spans weigh what they are; the border frame is the next span's.
+    std::vector<size_t> judged_frames_of(uint32_t span) const {
+        const uint32_t nominal = std::min(plan_.length(), plan_.frames), stride = (nominal + judged_frames - 1) / judged_frames;
+        const uint32_t end = plan_.last(span) + (span + 1 == plan_.spans() ? 1 : 0);
+        std::vector<size_t> chosen;
+        for (uint32_t i = plan_.first(span); i < end; i += stride) chosen.push_back(i);
+        return chosen;
+    }
+
+    SpanResult cook(uint32_t span, const std::string& output, double tolerance, const std::function<void(uint32_t)>& done) const {
+        const WindowGoal goal = goal_for(tolerance, survey_, settings_.jobs);
+        AssetWriter writer(output);
+        const SequenceInfo& info = reader_.info();
+        const uint32_t begin = plan_.first(span), end = plan_.last(span);
+        SpanResult result;
+        result.span = span, result.tolerance = tolerance;
+        result.numbers.assign(info.numbers.begin() + begin, info.numbers.begin() + end + 1);
+        result.seconds.assign(info.seconds.begin() + begin, info.seconds.begin() + end + 1);
+        std::vector<Path> survivors;
+        std::shared_ptr<const SurfaceFrame> border;
+        for (uint32_t first = begin;; first += plan_.window) {
+            Window window = load(first, std::min(end, first + plan_.window), border);
+            window.opens_span = first == begin;
+            const uint32_t last = first + uint32_t(window.samples()) - 1;
+            grow_tracks(window, survivors, goal);
+            const CodedWindow coded = code_tracks(window, goal, tables_);
+            write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), last == end, result);
+            survivors = survivors_of(window);
+            border = window.frames.back();
+            done(last - begin);
+            if (last == end) break;
+        }
+        write(writer, result);
+        return result;
+    }
+
+    void write(AssetWriter& writer, const SpanResult& result) const {
+        AssetFacts facts = asset_facts(facts_, result.numbers, result.seconds);
+        facts.settings_json = part_settings(facts_, {result}, result.numbers);
+        writer.finish(facts);
+    }
+
+    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border) const {
+        Window window;
+        window.first = int(first);
+        window.frames.resize(last - first + 1);
+        for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
+        parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
+            window.frames[s] = s == 0 && border ? border
+                                                : std::make_shared<SurfaceFrame>(reader_.read(first + s), survey_.edge);
+        });
+        return window;
+    }
+
+    const SequenceReader& reader_;
+    const CookSettings& settings_;
+    const Survey& survey_;
+    const SpanPlan& plan_;
+    const CookFacts& facts_;
+    double target_;
+    format::BasisTables tables_{};
+    std::vector<double> tables_memory_;
+};
 
 void check(const CookSettings& settings) {
     if (settings.window < 1 || settings.window + 1 > int(format::max_window_samples))
         throw UsageError("--window must be 1 to " + std::to_string(format::max_window_samples - 1) + " frames");
     if (settings.layers < 1 || settings.layers > int(format::max_layers))
         throw UsageError("layers must be 1 to " + std::to_string(format::max_layers));
+    if (settings.segments > 0 && settings.segment >= settings.segments) throw UsageError("--segment I/N needs I from 1 to N");
+    error_target(settings.error, 1, 1);
+}
+
+/// What decides every byte of the asset, but for the input's content.
+nlohmann::json decisive_settings(const CookSettings& settings) {
+    return {{"error", settings.error}, {"window", settings.window}, {"layers", settings.layers}, {"read", read_settings(settings.read)}};
+}
+
+std::unique_ptr<SequenceReader> open_input(const std::string& input, const CookSettings& settings) {
+    ReadOptions options = settings.read;
+    options.require_velocity = true;
+    return open_sequence(input, options);
+}
+
+/// An opened input with its place in the scheme of spans.
+struct Job {
+    std::unique_ptr<SequenceReader> reader;
+    std::string input_hash, key, folder;  ///< folder: where finished spans are kept
+    SpanPlan plan;
+    SpanRange share;
+
+    Job(const std::string& input, const std::string& output, const CookSettings& settings) {
+        check(settings);
+        reader = open_input(input, settings);
+        input_hash = known_input(*reader, settings.read, settings.survey, settings.jobs);
+        const nlohmann::json all = {{"settings", decisive_settings(settings)}, {"input", input_hash}, {"numbers", reader->info().numbers},
+                                    {"windows_per_span", windows_per_span}, {"format", format::current_version}, {"tool", RILL_VERSION}};
+        key = hash_text(all.dump());
+        folder = output + ".cook-" + key.substr(0, 16);
+        plan = {uint32_t(reader->info().numbers.size()), uint32_t(settings.window)};
+        share = settings.segments > 0 ? segment_of(plan, settings.segment, settings.segments) : SpanRange{0, plan.spans()};
+    }
+    std::string part(uint32_t span) const {
+        char name[64];
+        std::snprintf(name, sizeof name, "/span_%05u_of_%05u.rill", span + 1, plan.spans());
+        return folder + name;
+    }
+    /// A part of this very span, whole and undamaged.
+    bool has(uint32_t span) const {
+        try {
+            const Part found = read_part(part(span));
+            return found.cook.at("key") == key && found.spans.size() == 1 && found.spans[0].span == span;
+        } catch (const InputError&) {
+            return false;
+        }
+    }
+    /// The output, when it is already what would be made; null otherwise.
+    nlohmann::json finished(const std::string& output, bool as_part) const {
+        if (!fs::is_regular_file(output)) return nullptr;
+        try {
+            if (as_part) {
+                const Part found = read_part(output);
+                const bool same = found.cook.at("key") == key && found.spans.front().span == share.first && found.spans.back().span + 1 == share.end;
+                return same ? found.cook : nlohmann::json(nullptr);
+            }
+            const AssetDirectory directory = read_directory(output);
+            nlohmann::json stored = nlohmann::json::parse(directory.settings_json, nullptr, false);
+            if (!stored.is_object() || stored.value("key", nlohmann::json()) != key) return nullptr;
+            check_chunks(directory);
+            return stored;
+        } catch (const InputError&) {
+            return nullptr;
+        }
+    }
+};
+
+/// The folder of finished spans: gone when the cook is done, kept if there is anything in it when not.
+class WorkFolder {
+public:
+    WorkFolder(const std::string& output, std::string path) : path_(std::move(path)) {
+        std::error_code error;
+        fs::create_directory(path_, error);
+        if (error) throw InputError(output + ": cannot be written: " + error.message());
+    }
+    ~WorkFolder() {
+        std::error_code ignored;
+        fs::remove(path_, ignored);  // if it is empty
+    }
+    /// Also what earlier cooks of this output have left, of other input or settings.
+    void remove_all(const std::string& output) const {
+        std::error_code ignored;
+        const fs::path target = fs::absolute(output, ignored);
+        const std::string prefix = target.filename().string() + ".cook-";
+        std::vector<fs::path> old;
+        for (fs::directory_iterator at(target.parent_path(), ignored), end; !ignored && at != end; at.increment(ignored)) {
+            const std::string name = at->path().filename().string();
+            if (name.size() == prefix.size() + 16 && name.compare(0, prefix.size(), prefix) == 0 &&
+                name.find_first_not_of("0123456789abcdef", prefix.size()) == std::string::npos)
+                old.push_back(at->path());
+        }
+        for (const fs::path& path : old) fs::remove_all(path, ignored);
+    }
+
+private:
+    std::string path_;
+};
+
+/// What every part and the asset say of the cook.
+nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Survey& survey, double target) {
+    const SequenceInfo& info = job.reader->info();
+    const double frames = double(info.numbers.size());
+    return {{"generator", "rill cook"},
+            {"tool", RILL_VERSION},
+            {"key", job.key},
+            {"span_count", job.plan.spans()},
+            {"settings", decisive_settings(settings)},
+            {"target", {{"p99_metres", target}}},
+            {"source",
+             {{"format", info.format}, {"frames", info.numbers.size()}, {"first_frame", info.numbers.front()},
+              {"frames_per_second", info.frames_per_second}, {"raw_bytes", info.raw_bytes},
+              {"triangles_per_frame", survey.triangles / frames}, {"vertices_per_frame", survey.vertices / frames},
+              {"median_edge_metres", survey.edge}}}};
+}
+
+CookReport report_of(const Linked& linked, bool up_to_date) {
+    CookReport report;
+    report.json = linked.report, report.up_to_date = up_to_date, report.target_met = linked.target_met;
+    report.target_p99 = linked.target_p99, report.measured_p99 = linked.measured_p99;
+    return report;
 }
 
 }  // namespace
 
 CookReport cook(const std::string& input, const std::string& output, const CookSettings& settings,
                 const std::function<void(const CookProgress&)>& progress) {
-    check(settings);
-    ReadOptions options = settings.read;
-    options.require_velocity = true;
-    auto reader = open_sequence(input, options);
-    const VelocityFit fit = check_velocity(*reader, options.warn);
-    reader = apply_fit(std::move(reader), fit);
-    const uint32_t frames = uint32_t(reader->info().numbers.size());
-    const Survey facts = survey(*reader, settings.jobs, [&](uint32_t done) { progress({done, frames, "surveying"}); });
+    Job job(input, output, settings);
+    const bool as_part = settings.segments > 0;
     CookReport report;
-    report.target_p99 = error_target(settings.error, facts.edge, facts.diagonal());
-    const auto judged = spread_frames(input, options, reader->info());
-    const uint32_t looks = uint32_t(judged->info().numbers.size());
-    // Closed loop: the finished file is decoded by the runtime and measured; the tolerance follows.
-    const PartialFile candidate{output + ".cooking"}, best{output + ".best"};
-    double tolerance = first_tolerance * report.target_p99, best_miss = HUGE_VAL;
-    for (int attempt = 1;; ++attempt) {
-        Cook cook(*reader, settings, facts, report.target_p99, progress);
-        nlohmann::json json = cook.run(candidate.path, tolerance, attempt == 1 ? "cooking" : "cooking again");
-        const VerifySummary measured = verify_asset(candidate.path, *judged, settings.jobs, [&](uint32_t done) {
-            progress({done, looks, "measuring"});
-        });
-        json["measured"] = measured.json;
-        const double ratio = measured.p99 / report.target_p99, miss = facts.triangles == 0 ? 0 : std::abs(std::log(ratio));
-        if (miss < best_miss) {
-            best_miss = miss, report.json = std::move(json), report.measured_p99 = measured.p99;
-            report.target_met = facts.triangles == 0 || ratio <= 1 + met_within;
-            move_file(candidate.path, best.path);
-        }
-        if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) break;
-        tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
+    report.is_part = as_part;
+    if (const nlohmann::json stored = settings.force ? nlohmann::json() : job.finished(output, as_part); !stored.is_null()) {
+        if (!as_part) return report_of(judge(stored), true);
+        report.json = stored, report.up_to_date = report.target_met = true;
+        return report;
     }
-    move_file(best.path, output);
+    if (fs::is_directory(output)) throw InputError(output + ": cannot be written: is a directory");
+    if (job.share.first == job.share.end) {  // fewer spans than segments
+        write_file(output, "");
+        report.target_met = true;
+        return report;
+    }
+    const WorkFolder folder(output, job.folder);
+    const uint32_t frames = job.plan.frames;
+    const Survey survey = survey_input(*job.reader, settings.read, settings.survey, job.input_hash, settings.jobs,
+                                       [&](uint32_t done) { progress({done, frames, "surveying"}); });
+    const double target = error_target(settings.error, survey.edge, survey.diagonal());
+    const CookFacts facts = {cook_json(job, settings, survey, target), job.reader->info().frames_per_second, uint32_t(settings.layers),
+                             survey.edge, survey.lower, survey.upper};
+    const auto reader = apply_fit(std::move(job.reader), survey.fit);
+    const SpanCook spans(*reader, settings, survey, job.plan, facts, target);
+    const uint32_t begin = job.plan.first(job.share.first), end = job.plan.last(job.share.end - 1);
+    std::vector<std::string> parts;
+    for (uint32_t span = job.share.first; span < job.share.end; ++span) {
+        const uint32_t first = job.plan.first(span), last = job.plan.last(span);
+        parts.push_back(job.part(span));
+        // A first attempt is about half the work: measuring it, and others, is the rest.
+        if (settings.force || !job.has(span))
+            spans.run(span, parts.back(), [&](uint32_t done) { progress({first - begin + done / 2, end - begin + 1, "cooking"}); });
+        progress({last - begin + (last == end ? 1 : 0), end - begin + 1, "cooking"});
+    }
+    if (as_part) {
+        link_part(parts, output);
+        report.json = facts.cook, report.target_met = true;
+    } else {
+        report = report_of(link_asset(parts, output), false);
+    }
+    folder.remove_all(output);
     return report;
+}
+
+CookPlan plan_cook(const std::string& input, const std::string& output, const CookSettings& settings) {
+    const Job job(input, output, settings);
+    CookPlan plan;
+    plan.key = job.key, plan.info = job.reader->info(), plan.spans = job.plan, plan.share = job.share;
+    plan.up_to_date = !settings.force && !job.finished(output, settings.segments > 0).is_null();
+    for (uint32_t span = job.share.first; span < job.share.end && !settings.force; ++span) plan.finished += job.has(span) ? 1 : 0;
+    plan.fit = check_velocity(*job.reader, settings.read.warn);
+    return plan;
+}
+
+std::vector<std::string> dependencies(const std::string& input, const CookSettings& settings) {
+    std::vector<std::string> all;
+    std::set<std::string> folders;  // frames that come and go change their folder
+    if (fs::is_directory(input)) folders.insert(input);
+    for (const fs::path& path : input_files(*open_input(input, settings))) {
+        all.push_back(path.string());
+        if (path.has_parent_path()) folders.insert(path.parent_path().string());
+    }
+    all.insert(all.end(), folders.begin(), folders.end());
+    return all;
 }
 
 }  // namespace rill::cooker

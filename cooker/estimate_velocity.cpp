@@ -111,13 +111,18 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return source_->name(index); }
+    std::vector<std::filesystem::path> files(size_t index) const override {
+        std::vector<std::filesystem::path> all = source_->files(index);
+        if (info_.seconds.size() > 1)
+            for (std::filesystem::path& path : source_->files(neighbour(index))) all.push_back(std::move(path));
+        return all;
+    }
     Mesh read_surface(size_t index) const override { return source_->read_surface(index); }
     Mesh read(size_t index) const override {
         Mesh mesh = source_->read_surface(index);
-        const size_t last = info_.seconds.size() - 1;
         mesh.velocities.assign(mesh.positions.size(), glm::vec3(0));
-        if (last == 0 || mesh.triangles.empty()) return mesh;
-        const size_t other = index < last ? index + 1 : index - 1;
+        if (info_.seconds.size() < 2 || mesh.triangles.empty()) return mesh;
+        const size_t other = neighbour(index);
         const double seconds = info_.seconds[other] - info_.seconds[index];  // negative at the end
         mesh.velocities = estimate_motion(mesh, source_->read_surface(other));
         for (glm::vec3& v : mesh.velocities) v *= float(1 / seconds);
@@ -125,6 +130,7 @@ public:
     }
 
 private:
+    size_t neighbour(size_t index) const { return index + 1 < info_.seconds.size() ? index + 1 : index - 1; }
     std::unique_ptr<SequenceReader> source_;
     SequenceInfo info_;
 };

@@ -15,7 +15,10 @@ constexpr int most_rounds = 8;  // of births at one frame
 constexpr int patience = 4;                        // frames a track is surplus before it dies
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
+constexpr float mended = 2;                        // tolerances of error left by coding that bear a point
 constexpr float surplus_angle = 0.1f;              // radians
+constexpr float widest = 5;                        // spacing that thinning leaves, in edges: beyond, patches outreach
+                                                   // the liquid's depth and the winding number has too few discs
 
 /// The points of one frame while the sweep stands there.
 struct Sweep {
@@ -30,11 +33,11 @@ Sweep alive_at(const Window& window, int sample) {
 }
 
 /// Carries every track alive at sample − 1 on to sample; those that cannot be carried have died.
-void carry_on(Window& window, int sample, int jobs) {
+void carry_on(Window& window, int sample, int jobs, size_t first_path = 0) {
     const SurfaceFrame &from = *window.frames[size_t(sample - 1)], &to = *window.frames[size_t(sample)];
     const float seconds = float(window.seconds[size_t(sample)] - window.seconds[size_t(sample - 1)]);
-    parallel_for(window.paths.size(), jobs, [&](size_t i) {
-        Path& path = window.paths[i];
+    parallel_for(window.paths.size() - first_path, jobs, [&](size_t i) {
+        Path& path = window.paths[first_path + i];
         if (path.death != sample - 1 || path.cause != Death::none) return;
         if (const auto next = carry_point(from, to, seconds, path.at.back(), path.radius)) {
             path.at.push_back(*next);
@@ -85,8 +88,9 @@ void thin_out(Window& window, int sample, const WindowGoal& goal) {
             if (++same == 1) nearest = d;
             if (same == 3) third = d;
         }
-        const bool crowded = nearest < 0.4f * window.frames[size_t(sample)]->edge || (same >= 3 && nearest < 0.2f * third);
-        if (!crowded && (path.surplus < patience || neighbour_gone)) continue;
+        const float edge = window.frames[size_t(sample)]->edge;
+        const bool crowded = nearest < 0.4f * edge || (same >= 3 && nearest < 0.2f * third);
+        if (!crowded && (path.surplus < patience || neighbour_gone || third > widest * edge)) continue;
         gone[k] = true;
         end(path, sample, crowded ? Death::crowded : Death::surplus);
     }
@@ -103,9 +107,9 @@ float spacing_at(const std::vector<SurfacePoint>& points, const VertexTree& tree
 
 /// Bears tracks where the frame misses the source; returns how many.
 size_t bear_tracks(Window& window, int sample, const Residual& residual, const std::vector<SurfacePoint>& points,
-                   const WindowGoal& goal) {
+                   const WindowGoal& goal, float threshold) {
     const SurfaceFrame& frame = *window.frames[size_t(sample)];
-    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, goal.tolerance);
+    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, threshold);
     std::vector<SurfacePoint> all = points;
     all.insert(all.end(), births.begin(), births.end());
     std::vector<glm::vec3> positions;
@@ -139,16 +143,29 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
         if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);
-        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal);
+        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal, goal.tolerance);
         last = born * enough <= sweep.points.size() || round + 1 == most_rounds;
         if (born == 0) break;
+    }
+}
+
+/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+    const size_t first = window.paths.size();
+    for (int s = 0; s < window.samples(); ++s) {
+        if (s > 0) carry_on(window, s, goal.jobs, first);
+        std::vector<SurfacePoint> points = decoded_points(coded.decoded, s);
+        for (size_t i = first; i < window.paths.size(); ++i)
+            if (window.paths[i].alive(s)) points.push_back(window.paths[i].target(s));
+        const Residual residual = measure_residual(*window.frames[size_t(s)], points, goal.jobs);
+        bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
     }
 }
 
 TrackSamples samples_of(const Window& window, const Path& path) {
     TrackSamples samples;
     samples.birth = uint8_t(path.birth), samples.death = uint8_t(path.death);
-    const bool enters = path.birth == 0 && (path.continues || window.opens_clip);
+    const bool enters = path.birth == 0 && (path.continues || window.opens_span);
     const bool leaves = path.death == window.samples() - 1;
     samples.flags = uint8_t((enters ? 0 : format::track_born) | (leaves ? 0 : format::track_dies));
     for (int s = path.birth; s <= path.death; ++s) {
@@ -196,6 +213,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
             coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
         });
         if (round == coding_rounds) return coded;
+        if (round == 0) mend(window, coded, goal);
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
             const SurfaceFrame& frame = *window.frames[s];
             std::vector<uint32_t> ids;
@@ -212,6 +230,7 @@ std::vector<Path> survivors_of(const Window& window) {
         if (path.death != window.samples() - 1) continue;
         Path last;
         last.radius = path.radius, last.continues = true, last.surplus = path.surplus;
+        last.age = path.age + path.death - path.birth;
         last.at = {path.at.back()}, last.correction = {path.correction.back()}, last.tilt = {path.tilt.back()};
         survivors.push_back(std::move(last));
     }

@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
     listen_for_interrupts();
     Run run;
     add_cook(app, run);
+    add_link(app, run);
     add_info(app, run);
     add_verify(app, run);
     add_export(app, run);

@@ -21,11 +21,13 @@ namespace rill::cooker {
 
 /// Why a track ends before its window does.
 enum class Death { none, left_surface, crowded, surplus };
+inline constexpr const char* death_names[] = {"span_ends", "left_surface", "crowded", "surplus"};
 
 /// One track while it is made: samples birth … death of its window.
 struct Path {
     int birth = 0, death = 0;
     bool continues = false;              ///< comes from the previous window
+    int age = 0;                         ///< frames it has lived before this window's first
     Death cause = Death::none;           ///< set: is not carried on
     int surplus = 0;                     ///< frames in a row that it was not needed
     float radius = 0;                    ///< of the local fit that places it, metres
@@ -39,7 +41,7 @@ struct Path {
 
 struct Window {
     int first = 0;                       ///< frame index of sample 0
-    bool opens_clip = false, ends_clip = false;
+    bool opens_span = false;             ///< nothing comes from before: the surface stands there from the start
     std::vector<std::shared_ptr<const SurfaceFrame>> frames;
     std::vector<double> seconds;
     std::vector<Path> paths;

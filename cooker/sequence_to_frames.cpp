@@ -73,6 +73,7 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return source_->name(chosen_.at(index)); }
+    std::vector<std::filesystem::path> files(size_t index) const override { return source_->files(chosen_.at(index)); }
     Mesh read_surface(size_t index) const override {
         Mesh mesh = source_->read_surface(chosen_.at(index));
         check_frame(mesh, name(index), [this](const std::string& message) { warn_once(message); });

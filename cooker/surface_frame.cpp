@@ -7,8 +7,6 @@
 #include <nanoflann.hpp>
 #include <numeric>
 
-#include "surface_distance.h"
-
 namespace rill::cooker {
 namespace {
 
@@ -56,7 +54,6 @@ void group_vertices(SurfaceFrame& frame, float size) {
 
 /// On every sixth vertex's normal, near and farther, wherever no other surface comes close.
 void place_probes(SurfaceFrame& frame) {
-    const SurfaceIndex index(frame.mesh);
     for (const VertexGroup& group : frame.groups) {
         frame.first_probe.push_back(uint32_t(frame.probes.size()));
         for (uint32_t i = group.first; i < group.first + group.count; i += 6) {
@@ -65,7 +62,7 @@ void place_probes(SurfaceFrame& frame) {
                 const float away = edges * frame.edge;
                 const glm::vec3 x = frame.mesh.positions[v] + away * frame.mesh.normals[v];
                 const float clear = 0.7f * std::fabs(away);
-                if (index.closest(x, clear).distance < clear) continue;
+                if (frame.index.closest(x, clear).distance < clear) continue;
                 frame.probes.push_back({x, v, away > 0});
             }
         }
@@ -107,7 +104,7 @@ void VertexTree::within(const glm::vec3& x, float radius, std::vector<Found>& ou
 }
 
 SurfaceFrame::SurfaceFrame(Mesh source, float edge_length)
-    : mesh(std::move(source)), area(vertex_areas(mesh)), tree(mesh.positions), edge(edge_length) {
+    : mesh(std::move(source)), area(vertex_areas(mesh)), tree(mesh.positions), index(mesh), edge(edge_length) {
     if (mesh.normals.empty()) mesh.normals = vertex_normals(mesh);
     group_vertices(*this, 6 * edge);
     place_probes(*this);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mesh.h"
+#include "surface_distance.h"
 
 namespace rill::cooker {
 
@@ -53,6 +54,7 @@ struct SurfaceFrame {
     std::vector<Probe> probes;      ///< in the order of `groups`
     std::vector<uint32_t> first_probe;  ///< per group, and the end
     VertexTree tree;
+    SurfaceIndex index;
     float edge;                     ///< median edge of the sequence, metres
 };
 

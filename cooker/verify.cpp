@@ -2,6 +2,7 @@
 #include "verify.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <mutex>
 
@@ -34,21 +35,17 @@ void read_target(Verification& result, const std::string& settings_json) {
 }
 
 void sum_up(Verification& result) {
-    DistanceHistogram all;
-    double area = 0, mean = 0, degrees = 0;
     for (size_t i = 0; i < result.frames.size(); ++i) {
-        const SurfaceDistance& d = result.frames[i].distance;
-        double frame_area = 0;
-        for (double a : d.histogram.area) frame_area += a;
-        all.add(d.histogram);
-        area += frame_area;
-        if (frame_area > 0) mean += frame_area * d.mean, degrees += frame_area * d.normal_degrees;
-        result.max = std::max(result.max, d.max);
-        if (d.p99 > result.frames[result.worst].distance.p99) result.worst = i;
+        result.totals.add(result.frames[i]);
+        if (result.frames[i].distance.p99 > result.frames[result.worst].distance.p99) result.worst = i;
     }
-    if (area > 0) result.mean = mean / area, result.normal_degrees = degrees / area;
-    result.p99 = all.quantile(0.99);
+    result.mean = result.totals.mean(), result.p99 = result.totals.p99(), result.max = result.totals.max;
+    result.normal_degrees = result.totals.normal_degrees();
 }
+
+/// JSON knows no infinity.
+nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+double number(const nlohmann::json& json) { return json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>(); }
 
 }  // namespace
 
@@ -71,11 +68,8 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
                     const std::function<void(uint32_t, uint32_t)>& progress) {
     const AssetDirectory directory = read_directory(asset);
     const std::vector<int>& numbers = source.info().numbers;
-    const int first = directory.frame_number(0), last = directory.frame_number(directory.header.frame_count - 1);
-    for (int number : numbers)
-        if (number < first || number > last || (number - first) % directory.header.frame_step != 0)
-            throw InputError(asset + ": has no frame " + std::to_string(number) + ": it holds " + std::to_string(first) + " to " +
-                             std::to_string(last) + " by " + std::to_string(directory.header.frame_step));
+    std::vector<uint32_t> index;
+    for (int number : numbers) index.push_back(directory.index_of(number));
     Verification result;
     result.asset = asset, result.input = source.info().path;
     result.diagonal = directory.diagonal();
@@ -91,7 +85,7 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     parallel_for(threads, int(threads), [&](size_t part) {
         AssetPlayer player(asset);
         for (size_t i = numbers.size() * part / threads; i < numbers.size() * (part + 1) / threads; ++i) {
-            const double seconds = player.frame_seconds(uint32_t((numbers[i] - first) / directory.header.frame_step));
+            const double seconds = player.frame_seconds(index[i]);
             FrameMeasure& frame = result.frames[i] = measure(source.read_surface(i), player.mesh(seconds));
             frame.number = numbers[i], frame.seconds = seconds;
             const std::lock_guard lock(mutex);
@@ -102,12 +96,62 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     return result;
 }
 
-VerifySummary verify_asset(const std::string& asset, const SequenceReader& source, int jobs,
-                           const std::function<void(uint32_t)>& progress) {
-    const Verification result = verify(asset, source, jobs, [&](uint32_t done, uint32_t) { progress(done); });
-    VerifySummary summary{result.p99, to_json(result)};
-    summary.json.erase("frames");
-    return summary;
+void ErrorTotals::add(const FrameMeasure& frame) {
+    ErrorTotals one;
+    const SurfaceDistance& d = frame.distance;
+    for (double a : d.histogram.area) one.area += a;
+    if (one.area > 0) one.distance_area = one.area * d.mean, one.degrees_area = one.area * d.normal_degrees;
+    one.frames = 1, one.max = d.max, one.histogram = d.histogram;
+    one.open_edges = frame.decoded.open_edges, one.non_manifold_edges = frame.decoded.non_manifold_edges;
+    one.volume_ratio_min = one.volume_ratio_max = frame.volume_ratio();
+    one.worst_frame = frame.number, one.worst_p99 = d.p99;
+    add(one);
+}
+
+void ErrorTotals::add(const ErrorTotals& other) {
+    frames += other.frames, area += other.area, distance_area += other.distance_area, degrees_area += other.degrees_area;
+    max = std::max(max, other.max), histogram.add(other.histogram);
+    open_edges += other.open_edges, non_manifold_edges += other.non_manifold_edges;
+    volume_ratio_min = std::min(volume_ratio_min, other.volume_ratio_min);
+    volume_ratio_max = std::max(volume_ratio_max, other.volume_ratio_max);
+    if (other.worst_p99 > worst_p99) worst_p99 = other.worst_p99, worst_frame = other.worst_frame;
+}
+
+nlohmann::json to_json(const ErrorTotals& t) {
+    nlohmann::json bins = nlohmann::json::array();
+    for (double area : t.histogram.area) bins.push_back(number(area));
+    return {{"frames", t.frames}, {"area", number(t.area)}, {"distance_area", number(t.distance_area)},
+            {"degrees_area", number(t.degrees_area)}, {"max", number(t.max)}, {"histogram", bins}, {"open_edges", t.open_edges},
+            {"non_manifold_edges", t.non_manifold_edges}, {"volume_ratio_min", number(t.volume_ratio_min)},
+            {"volume_ratio_max", number(t.volume_ratio_max)}, {"worst_frame", t.worst_frame}, {"worst_p99", number(t.worst_p99)}};
+}
+
+ErrorTotals totals_from_json(const nlohmann::json& json) {
+    ErrorTotals t;
+    t.frames = json.at("frames"), t.area = number(json.at("area")), t.distance_area = number(json.at("distance_area"));
+    t.degrees_area = number(json.at("degrees_area")), t.max = number(json.at("max"));
+    for (const nlohmann::json& area : json.at("histogram")) t.histogram.area.push_back(number(area));
+    t.open_edges = json.at("open_edges"), t.non_manifold_edges = json.at("non_manifold_edges");
+    t.volume_ratio_min = number(json.at("volume_ratio_min")), t.volume_ratio_max = number(json.at("volume_ratio_max"));
+    t.worst_frame = json.at("worst_frame"), t.worst_p99 = number(json.at("worst_p99"));
+    return t;
+}
+
+nlohmann::json summary_json(const ErrorTotals& t, double diagonal) {
+    const double percent = diagonal > 0 ? 100 / diagonal : 0;
+    return {{"frames", t.frames},
+            {"mean_m", t.mean()},
+            {"p99_m", t.p99()},
+            {"max_m", t.max},
+            {"mean_percent", t.mean() * percent},
+            {"p99_percent", t.p99() * percent},
+            {"max_percent", t.max * percent},
+            {"normal_degrees", t.normal_degrees()},
+            {"open_edges", t.open_edges},
+            {"non_manifold_edges", t.non_manifold_edges},
+            {"volume_ratio_min", t.volume_ratio_min},
+            {"volume_ratio_max", t.volume_ratio_max},
+            {"worst_frame", t.worst_frame}};
 }
 
 nlohmann::json to_json(const Verification& v) {
@@ -120,8 +164,6 @@ nlohmann::json to_json(const Verification& v) {
         return json{{"max_m", d.max}, {"mean_m", d.mean}, {"normal_degrees", d.normal_degrees}, {"p99_m", d.p99}};
     };
     json frames = json::array();
-    uint64_t open = 0, non_manifold = 0;
-    double least = std::numeric_limits<double>::infinity(), most = 0;
     for (const FrameMeasure& f : v.frames) {
         frames.push_back({{"frame", f.number},
                           {"seconds", f.seconds},
@@ -137,12 +179,9 @@ nlohmann::json to_json(const Verification& v) {
                           {"decoded_triangles", f.decoded_triangles},
                           {"source", topology_json(f.source)},
                           {"decoded", topology_json(f.decoded)}});
-        open += f.decoded.open_edges, non_manifold += f.decoded.non_manifold_edges;
-        least = std::min(least, f.volume_ratio()), most = std::max(most, f.volume_ratio());
     }
     json target = nullptr;
     if (v.target_p99 > 0) target = {{"error", v.target}, {"p99_m", v.target_p99}, {"met", v.target_met()}};
-    const double percent = v.diagonal > 0 ? 100 / v.diagonal : 0;
     return {{"report", "rill verify"},
             {"version", 1},
             {"asset", v.asset},
@@ -151,20 +190,7 @@ nlohmann::json to_json(const Verification& v) {
             {"median_edge_m", v.edge},
             {"bytes_per_frame", v.bytes_per_frame},
             {"target", target},
-            {"summary",
-             {{"frames", v.frames.size()},
-              {"mean_m", v.mean},
-              {"p99_m", v.p99},
-              {"max_m", v.max},
-              {"mean_percent", v.mean * percent},
-              {"p99_percent", v.p99 * percent},
-              {"max_percent", v.max * percent},
-              {"normal_degrees", v.normal_degrees},
-              {"open_edges", open},
-              {"non_manifold_edges", non_manifold},
-              {"volume_ratio_min", least},
-              {"volume_ratio_max", most},
-              {"worst_frame", v.frames.empty() ? 0 : v.frames[v.worst].number}}},
+            {"summary", summary_json(v.totals, v.diagonal)},
             {"frames", frames}};
 }
 

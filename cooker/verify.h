@@ -21,9 +21,31 @@ struct FrameMeasure {
     Topology source, decoded;
     double volume_ratio() const; ///< decoded / source; 1 when both are empty
 };
+/// Errors of many frames added up; totals of parts add up to those of the whole.
+struct ErrorTotals {
+    uint32_t frames = 0;
+    double area = 0, distance_area = 0, degrees_area = 0, max = 0;
+    DistanceHistogram histogram;
+    uint64_t open_edges = 0, non_manifold_edges = 0;     ///< decoded
+    double volume_ratio_min = 1e300, volume_ratio_max = 0;
+    int worst_frame = 0;         ///< number of the frame with the largest p99
+    double worst_p99 = -1;
+    void add(const FrameMeasure& frame);
+    void add(const ErrorTotals& other);
+    double mean() const { return area > 0 ? distance_area / area : 0; }
+    double normal_degrees() const { return area > 0 ? degrees_area / area : 0; }
+    double p99() const { return histogram.quantile(0.99); }
+};
+/// Exact to the bit, there and back.
+nlohmann::json to_json(const ErrorTotals& totals);
+ErrorTotals totals_from_json(const nlohmann::json& json);
+/// As `summary` of a report of `rill verify`.
+nlohmann::json summary_json(const ErrorTotals& totals, double diagonal);
+
 struct Verification {
     std::string asset, input;
     std::vector<FrameMeasure> frames;
+    ErrorTotals totals;
     double diagonal = 0;         ///< of the asset's bounds, metres
     double edge = 0;             ///< the source's median edge as the asset states it, metres
     std::string target;          ///< the asset's own --error; empty when it states none
@@ -42,13 +64,6 @@ std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const s
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
                     const std::function<void(uint32_t done, uint32_t total)>& progress = {});
 
-/// What the cook's closed loop asks.
-struct VerifySummary {
-    double p99 = 0;       ///< metres, over the surface of all frames
-    nlohmann::json json;  ///< to_json() without the list of frames
-};
-VerifySummary verify_asset(const std::string& asset, const SequenceReader& source, int jobs,
-                           const std::function<void(uint32_t done)>& progress);
 /// Documented in cooker/README.md.
 nlohmann::json to_json(const Verification& verification);
 /// One self-contained page: figures, graphs, and the worst frames beside those of the source.

@@ -12,14 +12,17 @@
 
 namespace rill::cooker {
 
-enum Stage { stage_plan, stage_decode, stage_field, stage_mesh, stage_wait, stage_total, stage_count };
-inline constexpr const char* stage_names[stage_count] = {"plan", "decode", "field", "mesh", "wait", "total"};
+enum Stage { stage_plan, stage_decode, stage_field, stage_mesh, stage_wait, stage_total, stage_processor, stage_count };
+inline constexpr const char* stage_names[stage_count] = {"plan", "decode", "field", "mesh", "wait", "total", "processor"};
 
 struct BenchFrame {
-    std::array<uint32_t, stage_count> microseconds{};  ///< total: from begin_frame() to the return of end_frame()
+    std::array<uint32_t, stage_count> microseconds{};  ///< total: from begin_frame() to the return of end_frame(); processor: time that all threads together computed meanwhile
     uint32_t triangles = 0, points = 0, cut = 0;
     uint64_t hash = 0;                                 ///< FNV-1a of every buffer written
 };
+
+/// Processor time of all threads so far, microseconds: on a busy machine, a better measure than the clock.
+uint64_t processor_microseconds();
 
 /// Heap memory that counts.
 struct CountedMemory {

@@ -16,6 +16,7 @@ enum ExitCode { exit_done = 0, exit_usage = 1, exit_input = 2, exit_target_misse
 /// Set by the subcommand that was named; returns the exit code, or throws UsageError or InputError.
 using Run = std::function<int()>;
 void add_cook(CLI::App& app, Run& run);
+void add_link(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
 void add_verify(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
@@ -32,7 +33,7 @@ FrameRange parse_frames(const std::string& text);
 struct InputOptions {
     std::string path, velocity_unit = "second";
     ReadOptions read;
-    void add_to(CLI::App& command);
+    CLI::Option* add_to(CLI::App& command);  ///< returns INPUT, required
     ReadOptions checked() const;  ///< with warnings to stderr. Throws UsageError
 };
 
@@ -51,6 +52,12 @@ private:
     std::string last_stage_;
     std::chrono::steady_clock::time_point start_, stage_end_, last_shown_;
 };
+
+/// Size and error of a finished asset, and the exit code that follows.
+int tell_target(const std::string& asset, double target_p99, double measured_p99, bool met, bool quiet);
+/// A recipe holds the long options of `rill cook` by name; what stands on the command line goes before it. Paths are
+/// relative to the recipe. See RECIPES.md. Throws InputError, UsageError.
+void apply_recipe(const std::string& path, CLI::App& command);
 
 /// Written with two spaces of indent and sorted keys; "-" is standard output.
 void write_json(const std::string& path, const nlohmann::json& json);

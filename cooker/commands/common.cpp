@@ -41,11 +41,12 @@ FrameRange parse_frames(const std::string& text) {
     return {values[0], values[1], values[2]};
 }
 
-void InputOptions::add_to(CLI::App& command) {
-    command.add_option("INPUT", path, "Directory, pattern (frame_%04d.ply, 'frame_*.ply') or file")->required();
+CLI::Option* InputOptions::add_to(CLI::App& command) {
+    CLI::Option* input = command.add_option("INPUT", path, "Directory, pattern (frame_%04d.ply, 'frame_*.ply') or file")->required();
     command.add_option("--fps", read.frames_per_second, "Frames per second, over what the source says")->check(CLI::PositiveNumber);
     command.add_option("--velocity", read.velocity_name, "Name of the velocity attribute");
     command.add_option("--velocity-unit", velocity_unit, "Metres per: second, frame")->check(CLI::IsMember({"second", "frame"}));
+    return input;
 }
 
 ReadOptions InputOptions::checked() const {

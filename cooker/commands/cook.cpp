@@ -5,74 +5,118 @@
 #include <filesystem>
 
 #include "commands/commands.h"
-#include "error_target.h"
-#include "readers/file_bytes.h"
+#include "output_file.h"
 
 namespace rill::cooker {
 namespace {
 
 struct CookOptions {
     InputOptions input;
-    std::string output, frames, recipe, report;
+    std::string output, frames, recipe, report, depfile, segment;
     CookSettings settings;
-    bool quiet = false;
+    bool quiet = false, dry_run = false;
 };
 
-/// A recipe holds the long options of this command by name; the command line goes before it.
-void apply_recipe(const std::string& path, CLI::App& command) {
-    const nlohmann::json json = nlohmann::json::parse(read_file(path), nullptr, false);
-    if (!json.is_object()) throw InputError(path + ": not a JSON object");
-    for (const auto& [key, value] : json.items()) {
-        CLI::Option* option = command.get_option_no_throw("--" + key);
-        if (!option || key == "recipe" || key == "output" || key == "help" || key == "quiet")
-            throw UsageError(path + ": '" + key + "' is no setting of a recipe");
-        if (!value.is_string() && !value.is_number()) throw UsageError(path + ": '" + key + "' must be a text or a number");
-        if (option->count() > 0) continue;
-        option->add_result(value.is_string() ? value.get<std::string>() : value.dump());
-        try {
-            option->run_callback();
-        } catch (const CLI::ParseError& error) {
-            throw UsageError(path + ": " + error.what());
+/// "I/N", I from 1.
+void parse_segment(const std::string& text, CookSettings& settings) {
+    int index = 0, count = 0, read = 0;
+    if (std::sscanf(text.c_str(), "%d/%d%n", &index, &count, &read) != 2 || size_t(read) != text.size() || index < 1 || count < index || count > 100000)
+        throw UsageError("--segment '" + text + "' is not I/N with I from 1 to N");
+    settings.segment = uint32_t(index - 1), settings.segments = uint32_t(count);
+}
+
+/// A rule as make and ninja read it.
+std::string make_rule(const std::string& target, const std::vector<std::string>& needed) {
+    const auto escaped = [](const std::string& path) {
+        std::string text;
+        for (char c : path) {
+            if (c == ' ' || c == '#' || c == '\\') text += '\\';
+            if (c == '$') text += '$';
+            text += c;
         }
-    }
+        return text;
+    };
+    std::string rule = escaped(target) + ":";
+    for (const std::string& path : needed) rule += " \\\n  " + escaped(path);
+    return rule + "\n";
+}
+
+std::string in_words(const VelocityFit& fit) {
+    if (fit.meaning == VelocityMeaning::none) return "none";
+    char text[160];
+    std::snprintf(text, sizeof text, "%s, times %.4g%s", fit.meaning == VelocityMeaning::backward ? "brought the liquid to its frame" : "carries on to the next frame",
+                  fit.factor, fit.conclusive ? "" : " (too little moves to tell)");
+    return text;
+}
+
+int dry_run(const CookOptions& options) {
+    const CookPlan plan = plan_cook(options.input.path, options.output, options.settings);
+    std::printf("input     %s: %s, %zu frames from %d to %d, %g per second\n", options.input.path.c_str(), plan.info.format.c_str(),
+                plan.info.numbers.size(), plan.info.numbers.front(), plan.info.numbers.back(), plan.info.frames_per_second);
+    std::printf("velocity  %s\n", in_words(plan.fit).c_str());
+    std::printf("spans     %u of %u frames", plan.spans.spans(), plan.spans.length());
+    if (options.settings.segments > 0) std::printf("; segment %s: %u of them", options.segment.c_str(), plan.share.end - plan.share.first);
+    std::printf(plan.finished > 0 ? "; %u are finished already\n" : "\n", plan.finished);
+    std::printf("key       %s\n", plan.key.c_str());
+    std::printf("output    %s: %s\n", options.output.c_str(), plan.up_to_date ? "up to date" : "would be cooked");
+    return exit_done;
 }
 
 int cook_command(CookOptions& options, CLI::App& command) {
     if (!options.recipe.empty()) apply_recipe(options.recipe, command);
+    if (options.input.path.empty()) throw UsageError("INPUT is required, on the command line or in a recipe");
+    if (options.output.empty()) throw UsageError("--output is required, on the command line or in a recipe");
     CookSettings& settings = options.settings;
     settings.read = options.input.checked();
-    settings.read.require_velocity = true;
     const FrameRange frames = parse_frames(options.frames);
     settings.read.first = frames.first, settings.read.last = frames.last, settings.read.step = frames.step;
-    error_target(settings.error, 1, 1);  // a misspelt one is a usage error before any work
-    Progress progress("cook", options.quiet);
-    const CookReport report = cook(options.input.path, options.output, settings, [&](const CookProgress& p) {
-        progress(p.stage, p.frames_done, p.frames_total);
-    });
+    if (!options.segment.empty()) parse_segment(options.segment, settings);
+    if (options.dry_run) return dry_run(options);
+    CookReport report;
+    {
+        Progress progress("cook", options.quiet);
+        report = cook(options.input.path, options.output, settings, [&](const CookProgress& p) { progress(p.stage, p.frames_done, p.frames_total); });
+    }
     if (!options.report.empty()) write_json(options.report, report.json);
-    if (!options.quiet)
-        std::printf("%s: %s; p99 error %.4g m, aimed at %.4g m\n", options.output.c_str(),
-                    readable_bytes(double(std::filesystem::file_size(options.output))).c_str(), report.measured_p99, report.target_p99);
-    if (report.target_met) return exit_done;
-    std::fprintf(stderr, "rill: %s: target missed: p99 error is %.4g m, %.2f times the %.4g m aimed at\n", options.output.c_str(),
-                 report.measured_p99, report.measured_p99 / report.target_p99, report.target_p99);
-    return exit_target_missed;
+    if (!options.depfile.empty()) {
+        std::vector<std::string> needed = dependencies(options.input.path, settings);
+        if (!options.recipe.empty()) needed.push_back(options.recipe);
+        write_file(options.depfile, make_rule(options.output, needed));
+    }
+    if (!options.quiet && report.up_to_date)
+        std::printf("%s: up to date: the same input, settings and tool; --force cooks anew\n", options.output.c_str());
+    return report.is_part ? int(exit_done) : tell_target(options.output, report.target_p99, report.measured_p99, report.target_met, options.quiet);
 }
 
 }  // namespace
 
+int tell_target(const std::string& asset, double target_p99, double measured_p99, bool met, bool quiet) {
+    if (!quiet)
+        std::printf("%s: %s; p99 error %.4g m, aimed at %.4g m\n", asset.c_str(), readable_bytes(double(std::filesystem::file_size(asset))).c_str(),
+                    measured_p99, target_p99);
+    if (met) return exit_done;
+    std::fprintf(stderr, "rill: %s: target missed: p99 error is %.4g m, %.2f times the %.4g m aimed at\n", asset.c_str(), measured_p99,
+                 measured_p99 / target_p99, target_p99);
+    return exit_target_missed;
+}
+
 void add_cook(CLI::App& app, Run& run) {
     auto options = std::make_shared<CookOptions>();
     CLI::App* command = app.add_subcommand("cook", "Cook a fluid mesh sequence into an asset");
-    options->input.add_to(*command);
-    command->add_option("-o,--output", options->output, "The asset, .rill")->required();
+    options->input.add_to(*command)->required(false);
+    command->add_option("-o,--output", options->output, "The asset, .rill");
     command->add_option("--error", options->settings.error, "p99 error aimed at: 0.25e (edges), 0.1% (of the diagonal), 2mm")->capture_default_str();
     command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive");
     command->add_option("--window", options->settings.window, "Frames per window")->check(CLI::Range(1, 64))->capture_default_str();
     command->add_option("--layers", options->settings.layers, "Layers of detail")->check(CLI::Range(1, 8))->capture_default_str();
     command->add_option("--jobs", options->settings.jobs, "Threads; 0: all cores")->check(CLI::Range(0, 1024));
-    command->add_option("--recipe", options->recipe, "JSON file of these settings; the command line goes before it");
+    command->add_option("--recipe", options->recipe, "JSON file of these settings (see RECIPES.md); the command line goes before it");
     command->add_option("--report", options->report, "Write the report as JSON; - is standard output");
+    command->add_option("--depfile", options->depfile, "Write what the asset depends on, as a rule for make and ninja");
+    command->add_option("--segment", options->segment, "I/N: cook this share only, into a part for rill link");
+    command->add_option("--survey", options->settings.survey, "Keep what all segments must know of the input in this file");
+    command->add_flag("--force", options->settings.force, "Cook although the output is up to date");
+    command->add_flag("--dry-run", options->dry_run, "Say what would be done");
     command->add_flag("--quiet", options->quiet, "Errors only");
     command->callback([&run, options, command] { run = [options, command] { return cook_command(*options, *command); }; });
 }

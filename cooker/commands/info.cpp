@@ -103,6 +103,16 @@ void print_bytes(const nlohmann::json& cook) {
                         total > 0 ? 100 * value.get<double>() / total : 0);
 }
 
+void print_lives(const nlohmann::json& cook) {
+    if (!cook.is_object() || !cook.contains("lives") || !cook["lives"].is_object()) return;
+    const nlohmann::json& lives = cook["lives"];
+    std::printf("track lives  median %s frames, %s by point; ended by", lives.value("median_frames", nlohmann::json(0)).dump().c_str(),
+                lives.value("median_frames_by_point", nlohmann::json(0)).dump().c_str());
+    const nlohmann::json causes = lives.value("ended_by", nlohmann::json::object());
+    for (const auto& [cause, count] : causes.items()) std::printf(" %s %s", cause.c_str(), count.dump().c_str());
+    std::printf("\n");
+}
+
 void print(const nlohmann::json& info) {
     auto number = [&](const char* key) { return info[key].get<double>(); };
     std::printf("%s: Rill asset, format %.0f, content %s\n", info["asset"].get<std::string>().c_str(), number("format"),
@@ -127,6 +137,7 @@ void print(const nlohmann::json& info) {
         std::printf("  from frame %-5.0f %3.0f frames, %3.0f blocks, %4.0f chunks, %7.0f points, %10s\n", window["first_frame"].get<double>(),
                     window["frames"].get<double>(), window["blocks"].get<double>(), window["chunks"].get<double>(),
                     window["points"].get<double>(), readable_bytes(window["bytes"].get<double>()).c_str());
+    print_lives(info["cook"]);
     print_bytes(info["cook"]);
     if (!info["cook"].is_null()) std::printf("cook\n%s\n", info["cook"].dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }

@@ -48,6 +48,7 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return info_.path + " at " + std::to_string(times_.at(index)) + " s"; }
+    std::vector<std::filesystem::path> files(size_t) const override { return {info_.path}; }
     Mesh read(size_t index) const override {
         Mesh mesh;
         for (const Surface& surface : surfaces_) add(mesh, surface, index);

@@ -65,6 +65,15 @@ void parts_from_log(const std::string& log, std::map<int, double>& parts) {
     }
 }
 
+std::vector<fs::path> logs_of(const fs::path& cache) {
+    std::vector<fs::path> logs;
+    if (fs::is_directory(cache / "logs"))
+        for (const auto& entry : fs::directory_iterator(cache / "logs"))
+            if (entry.path().extension() == ".txt") logs.push_back(entry.path());
+    std::sort(logs.begin(), logs.end());
+    return logs;
+}
+
 std::map<int, double> first_substeps(const fs::path& cache) {
     std::map<int, double> parts;
     if (const fs::path stats = cache / "flipstats.data"; fs::exists(stats)) {
@@ -74,12 +83,7 @@ std::map<int, double> first_substeps(const fs::path& cache) {
             if (frame.is_object() && frame.contains("substeps"))
                 parts[std::atoi(key.c_str())] = 1 / std::max(1.0, positive(frame, "/substeps", stats, 1));
     }
-    std::vector<fs::path> logs;
-    if (fs::is_directory(cache / "logs"))
-        for (const auto& entry : fs::directory_iterator(cache / "logs"))
-            if (entry.path().extension() == ".txt") logs.push_back(entry.path());
-    std::sort(logs.begin(), logs.end());
-    for (const fs::path& log : logs) parts_from_log(read_file(log), parts);
+    for (const fs::path& log : logs_of(cache)) parts_from_log(read_file(log), parts);
     return parts;
 }
 
@@ -106,6 +110,15 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return meshes_.at(index).path.string(); }
+    std::vector<fs::path> files(size_t index) const override {
+        const int number = meshes_.at(index).number;
+        std::vector<fs::path> all = {meshes_.at(index).path};
+        for (const fs::path& path : {numbered("velocity", number, ".bobj"), numbered("metadata", number, ".json"),
+                                     cache_ / "export" / "flipdata.sim", cache_ / "flipstats.data"})
+            if (fs::exists(path)) all.push_back(path);
+        for (const fs::path& log : logs_of(cache_)) all.push_back(log);
+        return all;
+    }
     Mesh read(size_t index) const override {
         const FrameFile& file = meshes_.at(index);
         Bobj bobj = read_bobj(file.path);

@@ -73,6 +73,14 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return files_.at(index).path.string(); }
+    std::vector<fs::path> files(size_t index) const override {
+        const fs::path& path = files_.at(index).path;
+        std::vector<fs::path> all = {path};
+        if (format_.beside)
+            for (fs::path& more : format_.beside(path)) all.push_back(std::move(more));
+        if (const fs::path rate = path.parent_path() / "sequence.json"; fs::exists(rate)) all.push_back(rate);
+        return all;
+    }
     Mesh read(size_t index) const override {
         Mesh mesh = format_.read(files_.at(index).path, options_);
         if (options_.velocity_per_frame)
@@ -148,8 +156,8 @@ const std::vector<FrameFormat>& frame_formats() {
         {".ply", "PLY sequence", read_ply},
         {".obj", "OBJ sequence", read_obj},
         {".drc", "Draco sequence", read_drc},
-        {".glb", "glTF sequence", read_gltf},
-        {".gltf", "glTF sequence", read_gltf},
+        {".glb", "glTF sequence", read_gltf, gltf_buffers},
+        {".gltf", "glTF sequence", read_gltf, gltf_buffers},
         {".abc", "Alembic sequence", read_alembic_frame},
     };
     return formats;

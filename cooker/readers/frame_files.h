@@ -28,6 +28,8 @@ struct FrameFormat {
     std::string extension;  ///< lower case, with dot
     std::string name;       ///< "PLY sequence"
     Mesh (*read)(const std::filesystem::path& path, const ReadOptions& options);
+    /// Further files that reading `path` needs; null: none.
+    std::vector<std::filesystem::path> (*beside)(const std::filesystem::path& path) = nullptr;
 };
 const std::vector<FrameFormat>& frame_formats();
 /// Null when no format has this extension.
@@ -39,6 +41,7 @@ std::unique_ptr<SequenceReader> open_frame_files(const FrameFormat& format, std:
 Mesh read_ply(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_obj(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_gltf(const std::filesystem::path& path, const ReadOptions& options);
+std::vector<std::filesystem::path> gltf_buffers(const std::filesystem::path& path);
 Mesh read_alembic_frame(const std::filesystem::path& path, const ReadOptions& options);  ///< its first sample
 
 /// Readers with a directory layout of their own; null when `directory` is not theirs.

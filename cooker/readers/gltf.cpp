@@ -309,4 +309,33 @@ private:
 
 Mesh read_gltf(const std::filesystem::path& path, const ReadOptions& options) { return Scene(path, options).read(); }
 
+namespace {
+size_t glb_json_bytes(const std::string& bytes) {
+    uint32_t count;
+    std::memcpy(&count, bytes.data() + 12, sizeof count);
+    return count;
+}
+}  // namespace
+
+std::vector<std::filesystem::path> gltf_buffers(const std::filesystem::path& path) {
+    std::string text = read_file(path);
+    if (text.compare(0, 4, "glTF") == 0) text = text.substr(std::min<size_t>(20, text.size()), text.size() < 20 ? 0 : glb_json_bytes(text));
+    const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+    std::vector<std::filesystem::path> files;
+    if (!json.is_object() || !json.contains("buffers") || !json["buffers"].is_array()) return files;
+    for (const nlohmann::json& buffer : json["buffers"]) {
+        if (!buffer.is_object() || !buffer.contains("uri") || !buffer["uri"].is_string()) continue;
+        const std::string uri = buffer["uri"];
+        if (uri.compare(0, 5, "data:") == 0) continue;
+        std::string name;
+        for (size_t i = 0; i < uri.size(); ++i) {
+            const bool escaped = uri[i] == '%' && i + 2 < uri.size();
+            name += escaped ? char(std::strtol(uri.substr(i + 1, 2).c_str(), nullptr, 16)) : uri[i];
+            if (escaped) i += 2;
+        }
+        if (std::filesystem::exists(path.parent_path() / name)) files.push_back(path.parent_path() / name);
+    }
+    return files;
+}
+
 }  // namespace rill::cooker

@@ -70,6 +70,13 @@ public:
     }
     const SequenceInfo& info() const override { return info_; }
     std::string name(size_t index) const override { return meshes_.at(index).path.string(); }
+    std::vector<fs::path> files(size_t index) const override {
+        const int number = meshes_.at(index).number;
+        std::vector<fs::path> all = {meshes_.at(index).path, config_path(number)};
+        for (const fs::path& path : {velocity_path(number), cache_ / "bake.json"})
+            if (fs::exists(path)) all.push_back(path);
+        return all;
+    }
     Mesh read(size_t index) const override {
         const FrameFile& file = meshes_.at(index);
         const std::string bytes = read_gzip(file.path);

@@ -2,6 +2,7 @@
 // One interface for every input format. A reader hands out frames in metres and metres per second,
 // in the source's own frame numbers and time, wound counter-clockwise seen from the air.
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -47,6 +48,8 @@ public:
     virtual Mesh read_surface(size_t index) const { return read(index); }
     /// What messages call frame `index`: its file.
     virtual std::string name(size_t index) const = 0;
+    /// All files that frame `index` depends on, shared ones too; some may stand in many frames' lists.
+    virtual std::vector<std::filesystem::path> files(size_t index) const = 0;
 };
 
 /// Looks at the path and picks the reader. Throws InputError.

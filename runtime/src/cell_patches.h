@@ -21,6 +21,7 @@ struct CellPatches {
     uint8_t count = 0;               ///< patches, at most 4
     uint8_t doubled = 0;             ///< bits of ambiguous faces with both segments on one patch
     uint8_t patch[12] = {};          ///< of each sign-changing edge
+    uint16_t crossed = 0;            ///< which edges change sign
 };
 
 namespace patches_detail {
@@ -92,7 +93,7 @@ constexpr CellPatches trace(uint32_t inside, uint32_t turned) {
         if (!crossed(inside, e)) continue;
         uint32_t& n = name[joined.root[e]];
         if (n == 0) n = ++cell.count;
-        cell.patch[e] = uint8_t(n - 1);
+        cell.patch[e] = uint8_t(n - 1), cell.crossed = uint16_t(cell.crossed | 1u << e);
     }
     for (uint32_t f = 0; f < 6; ++f) {
         const Face face = face_of(f);

@@ -70,38 +70,65 @@ void for_surface_cells(const Tile& tile, Work work) {
     for (uint32_t block = 0; block < 8; ++block)
         for (uint32_t z = block & 4, rows = 0; rows < 16; ++rows) {
             const uint32_t row = (z + rows / 4) * 8 + (block * 2 & 4) + rows % 4, first = block * 4 & 4;
-            for (uint32_t x = first, bits = tile.surface[row] >> first & 15; bits; ++x, bits >>= 1)
-                if (bits & 1) work(x + 8 * row);
+            for_bits(tile.surface[row] >> first & 15, [&](uint32_t x) { work(first + x + 8 * row); });
         }
 }
 
-/// Appends the patches of a cell to the batch: mean of their crossings, and a normal from the signs.
-void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
-    const uint32_t x = cell % 8, y = cell / 8 % 8, z = cell / 64;
-    float sum[4][3] = {}, guess[4][3] = {};
-    uint32_t crossings[4] = {};
-    float value[8];
-    for (uint32_t c = 0; c < 8; ++c)
-        value[c] = tile.value[x + (c & 1) + 9 * (y + (c >> 1 & 1) + 9 * (z + (c >> 2)))];
+/// Corner values of a cell of a tile, from that of its lowest corner.
+constexpr uint32_t corner_offset[8] = {0, 1, 9, 10, 81, 82, 90, 91};
+/// An edge's lower corner.
+struct EdgePlace {
+    uint32_t axis, low, high;  ///< offsets of its ends
+    float corner[3];
+};
+constexpr std::array<EdgePlace, 12> place_edges() {
+    std::array<EdgePlace, 12> edges{};
     for (uint32_t e = 0; e < 12; ++e) {
-        const uint32_t axis = e / 4, low = patches_detail::edge_corner(e), high = low | 1u << axis;
-        if ((value[low] < 0) == (value[high] < 0)) continue;
-        const uint32_t p = patches.patch[e];
-        for (uint32_t a = 0; a < 3; ++a) sum[p][a] += float(low >> a & 1);
-        sum[p][axis] += value[low] / (value[low] - value[high]);
-        guess[p][axis] += value[low] < 0 ? 1.f : -1.f;
-        ++crossings[p];
+        const uint32_t low = patches_detail::edge_corner(e);
+        edges[e] = {e / 4, corner_offset[low], corner_offset[low | 1u << e / 4],
+                    {float(low & 1), float(low >> 1 & 1), float(low >> 2)}};
     }
-    const uint32_t at[3] = {x, y, z};
+    return edges;
+}
+constexpr std::array<EdgePlace, 12> edge_places = place_edges();
+
+const float* corner_values(const Tile& tile, uint32_t cell) {
+    return tile.value + cell % 8 + 9 * (cell / 8 % 8 + 9 * (cell / 64));
+}
+
+/// Appends the patches of a cell to the batch: mean of their crossings.
+void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
+    const float* value = corner_values(tile, cell);
+    float sum[4][3] = {}, crossings[4] = {};
+    for_bits(patches.crossed, [&](uint32_t e) {
+        const EdgePlace& edge = edge_places[e];
+        const float low = value[edge.low], high = value[edge.high];
+        const uint32_t p = patches.patch[e];
+        for (uint32_t a = 0; a < 3; ++a) sum[p][a] += edge.corner[a];
+        sum[p][edge.axis] += low / (low - high);
+        crossings[p] += 1;
+    });
+    const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     for (uint32_t p = 0; p < patches.count; ++p, ++n) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};
+        const float share = 1 / crossings[p];
         for (uint32_t a = 0; a < 3; ++a) {
-            const float inside = std::clamp(sum[p][a] / float(crossings[p]), cell_margin, 1 - cell_margin);
+            const float inside = std::clamp(sum[p][a] * share, cell_margin, 1 - cell_margin);
             *out[a] = (float(tile_cells * tile.coord[a] + int32_t(at[a])) + inside) * tile.cell;
-            s.guess[3 * n + a] = guess[p][a];
         }
-        s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell);
+        s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(p);
     }
+}
+
+/// A normal from the corners' signs, for where the field has none.
+void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t patch, float normal[3]) {
+    const CellPatches patches = patches_of(pattern_at(m, tile, cell));
+    const float* value = corner_values(tile, cell);
+    for (int a = 0; a < 3; ++a) normal[a] = 0;
+    for_bits(patches.crossed, [&](uint32_t e) {
+        if (patches.patch[e] == patch) normal[e / 4] += value[edge_places[e].low] < 0 ? 1.f : -1.f;
+    });
+    if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) normal[2] = 1;
 }
 
 /// One step onto the field, inside the cell. `i`: place in the batch.
@@ -139,8 +166,7 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
             float normal[3] = {s.gx[i], s.gy[i], s.gz[i]};
             float length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
             if (!(length2 > 1e-12f && length2 < 1e12f) || !(std::abs(s.value[i]) < surface::unsupported)) {
-                std::memcpy(normal, s.guess + 3 * slot, sizeof(normal));
-                if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) normal[2] = 1;
+                guess_normal(m, tile, s.cell[slot], s.patch[slot], normal);
                 length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
             }
             const float scale = 1 / std::sqrt(length2);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The mesher's memory and its table of stages. march.cpp finds the surface cells, cells_to_vertices.cpp
-// places their vertices, mesh_to_buffers.cpp joins them to triangles in the caller's buffers.
+// The mesher's memory and its table of stages. march.cpp finds the surface cells, drop_specks.cpp
+// clears noise from them, cells_to_vertices.cpp places their vertices, mesh_to_buffers.cpp joins them to
+// triangles in the caller's buffers.
 #include "field_to_mesh.h"
 
 #include <algorithm>
@@ -97,7 +98,15 @@ uint32_t prepare_mesh(void* mesher) {
                 if (m.input.late && m.input.late(m.input.user) && start_coarser(m, octaves_when_late))
                     m.cut |= cut_time;
                 tasks = prepare_march(mesher), m.run = run_march;
-                if (!tasks) m.phase = MeshPhase::counts;
+                if (!tasks) m.phase = MeshPhase::find_specks;
+                break;
+            case MeshPhase::find_specks:
+                tasks = prepare_specks(mesher), m.run = run_find_specks;
+                m.phase = MeshPhase::turn_specks;
+                break;
+            case MeshPhase::turn_specks:
+                tasks = prepare_specks(mesher), m.run = run_turn_specks;
+                m.phase = MeshPhase::counts;
                 break;
             case MeshPhase::counts:
                 tasks = prepare_counts(mesher), m.run = run_counts;

@@ -11,7 +11,7 @@
 namespace rill {
 namespace {
 
-constexpr float disc_share = 0.4f;  // of a patch's support: discs of neighbours just overlap
+constexpr float disc_share = 0.25f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
 void want(Tile& tile, const int cell[3]) {
@@ -99,15 +99,17 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const float cells = 1 / tile.cell, radius = disc_share * f.support[i] * cells + 0.5f;
     const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
     float at[3];  // in cells of this tile
+    for (int a = 0; a < 3; ++a) {
+        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
+        if (!(at[a] > -radius && at[a] < tile_cells + radius)) return;
+    }
     int from[3], to[3], home[3];
     bool is_home = true;
     for (int a = 0; a < 3; ++a) {
-        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
-        from[a] = int(std::clamp(std::floor(at[a] - radius), 0.f, 8.f));
-        to[a] = int(std::clamp(std::floor(at[a] + radius), -1.f, 7.f));
-        if (from[a] > to[a]) return;
+        from[a] = std::max(int(at[a] - radius + tile_cells) - tile_cells, 0);  // rounds down from −8 up
+        to[a] = std::min(int(at[a] + radius), tile_cells - 1);
         is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
-        home[a] = int(std::clamp(at[a], 0.f, 7.f));
+        home[a] = std::clamp(int(at[a]), 0, tile_cells - 1);
     }
     if (is_home) want(tile, home);
     const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
@@ -149,6 +151,9 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
     uint16_t hanging[81] = {};
     const bool mixed = (tile.beside & every_coarser) != 0;
     if (mixed) find_hanging(tile, hanging), need_parents(hanging, need);
+    float place[3][tile_corners];
+    for (uint32_t a = 0; a < 3; ++a)
+        for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(tile, a, k);
     uint32_t n = 0;
     // Octant by octant, so that batches are compact.
     for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -159,11 +164,10 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
                 const uint32_t row = y + 9 * z;
                 uint32_t bits = need[row] & ~uint32_t(tile.known[row] | hanging[row]) & (octant & 1 ? 0x1e0 : 0x01f);
                 tile.known[row] |= uint16_t(bits);
-                for (uint32_t x = 0; bits; ++x, bits >>= 1) {
-                    if (!(bits & 1)) continue;
-                    s.x[n] = corner_at(tile, 0, x), s.y[n] = corner_at(tile, 1, y);
-                    s.z[n] = corner_at(tile, 2, z), s.slot[n++] = uint16_t(x + 9 * row);
-                }
+                const float py = place[1][y], pz = place[2][z];
+                for_bits(bits, [&](uint32_t x) {
+                    s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x + 9 * row);
+                });
             }
     }
     s.corners_evaluated += n;
@@ -203,9 +207,6 @@ void borrow_corners(const Mesher& m, Tile& tile) {
     }
 }
 
-/// Faces spanned by corners x and x + 1 of the rows: both signs present.
-uint32_t mixed(uint32_t any, uint32_t all) { return (any | any >> 1) & ~(all & all >> 1) & 0xff; }
-
 /// Visits the pending cells, and makes pending what lies beyond their sign-changing faces.
 void visit(Tile& tile) {
     uint8_t next[rows_per_tile] = {};
@@ -216,7 +217,7 @@ void visit(Tile& tile) {
         const uint16_t* corner = tile.inside + y + 9 * z;
         const uint32_t a = corner[0], b = corner[1], c = corner[9], d = corner[10];
         const uint32_t any = a | b | c | d, all = a & b & c & d;
-        const uint32_t active = pending & mixed(any, all), x_faces = any & ~all;
+        const uint32_t active = pending & surface_cells(tile, row), x_faces = any & ~all;
         tile.visited[row] |= uint8_t(pending), tile.surface[row] |= uint8_t(active);
         const uint32_t left = active & x_faces, right = active & (x_faces >> 1);
         next[row] |= uint8_t(left >> 1 | right << 1);

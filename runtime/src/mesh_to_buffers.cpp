@@ -112,10 +112,10 @@ void write_tile(const Mesher& m, Tile& tile) {
             const QuadMasks quads = quads_of_row(writer.near, y, z);
             const uint32_t liquid = tile.inside[y + 9 * z];
             for (uint32_t axis = 0; axis < 3; ++axis)
-                for (int x = 0; x < tile_cells; ++x) {
-                    const int at[3] = {x, y, z};
-                    if (quads.axis[axis] >> x & 1) writer.quad(axis, at, liquid >> x & 1);
-                }
+                for_bits(quads.axis[axis], [&](uint32_t x) {
+                    const int at[3] = {int(x), y, z};
+                    writer.quad(axis, at, liquid >> x & 1);
+                });
         }
 }
 

@@ -37,6 +37,7 @@ struct Tile {
     uint64_t cross[6];               ///< cells wanted of the neighbour beyond each face, this round
     uint16_t known[81], inside[81];  ///< corners evaluated; those of negative value
     uint64_t turned[6];              ///< faces on borders with finer tiles, as `cross`: see turn_border_faces()
+    uint16_t speck[81];              ///< corners whose sign is noise
     float lower[3], upper[3];        ///< of all vertices its triangles use
     Beside at_place(uint32_t place) const { return Beside(beside >> (2 * place) & 3); }
     union {
@@ -48,6 +49,14 @@ struct Tile {
     };
 };
 
+/// Faces spanned by corners x and x + 1 of the rows: both signs present.
+constexpr uint32_t mixed(uint32_t any, uint32_t all) { return (any | any >> 1) & ~(all & all >> 1) & 0xff; }
+/// Cells of a row with corners of both signs.
+inline uint8_t surface_cells(const Tile& tile, uint32_t row) {
+    const uint16_t* c = tile.inside + row % 8 + 9 * (row / 8);
+    return uint8_t(mixed(c[0] | c[1] | c[9] | c[10], c[0] & c[1] & c[9] & c[10]));
+}
+
 /// Batches of positions on their way through the field; one per worker. Evaluation may reorder a batch, so
 /// `slot` travels with each position.
 struct MesherScratch {
@@ -56,9 +65,9 @@ struct MesherScratch {
     float x[capacity], y[capacity], z[capacity];
     uint16_t slot[capacity];
     float value[capacity], gx[capacity], gy[capacity], gz[capacity], velocity[3 * capacity];
-    // By slot, never reordered: the cell of a vertex, and a normal for where the field has none.
+    // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
-    float guess[3 * capacity];
+    uint8_t patch[capacity];
     uint16_t vertex[cells_per_tile];
     CellPattern pattern[cells_per_tile];
     uint64_t corners_evaluated;
@@ -82,7 +91,7 @@ struct OrderedTile {
     static constexpr uint32_t group_shift = 6;  ///< key >> group_shift names the group
 };
 
-enum class MeshPhase : uint8_t { march, counts, vertices, quads, ranges, done };
+enum class MeshPhase : uint8_t { march, find_specks, turn_specks, counts, vertices, quads, ranges, done };
 
 struct Mesher {
     MeshLimits limits;
@@ -111,6 +120,22 @@ struct Mesher {
 };
 
 /// Tiles a task takes: a tile alone is too little work for an engine's job.
+/// Number of the lowest bit set.
+inline uint32_t lowest_bit(uint32_t bits) {
+#if defined(__GNUC__)
+    return uint32_t(__builtin_ctz(bits));
+#else
+    uint32_t n = 0;
+    for (; !(bits & 1); bits >>= 1) ++n;
+    return n;
+#endif
+}
+/// Work(number) for each bit set, lowest first.
+template <typename Work>
+void for_bits(uint32_t bits, Work&& work) {
+    for (; bits; bits &= bits - 1) work(lowest_bit(bits));
+}
+
 inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16;
 constexpr uint32_t tasks_of(uint32_t tiles, uint32_t per_task) { return (tiles + per_task - 1) / per_task; }
 /// Runs work(tile index in the list) for the tiles of one task.
@@ -145,6 +170,11 @@ void turn_border_faces(Tile& tile) noexcept;
 // march.cpp: field → surface cells
 uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
+
+// drop_specks.cpp
+uint32_t prepare_specks(void* mesher);
+void run_find_specks(void* mesher, uint32_t task, uint32_t worker);
+void run_turn_specks(void* mesher, uint32_t task, uint32_t worker);
 
 // cells_to_vertices.cpp
 uint32_t prepare_counts(void* mesher);

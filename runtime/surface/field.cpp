@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "surface/field_kernels.h"
+#include "surface/field_rules.h"
 
 namespace rill::surface {
 namespace {
@@ -34,6 +35,7 @@ uint32_t grid_capacity(uint32_t points) { return 8 * points + 64; }
 
 /// Clusters are blocks of so many grid cells a side; a block of many points makes several.
 constexpr uint32_t cluster_cells = 4, cluster_size = 32;
+constexpr uint32_t group_cells = 4 * cluster_cells;  // groups of clusters likewise
 uint32_t cluster_capacity(uint32_t points) { return points; }
 
 struct Carver {
@@ -60,6 +62,7 @@ void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
     for (float*& array : field.inverse) array = carver.take<float>(drops);
     field.cell_start = carver.take<uint32_t>(grid_capacity(points) + 1);
     field.clusters = carver.take<Cluster>(cluster_capacity(points));
+    field.groups = carver.take<Cluster>(cluster_capacity(points));
     field.cluster_member = carver.take<uint32_t>(points);
 }
 
@@ -172,35 +175,103 @@ struct Neighbours {
     }
 };
 
-/// The nearest points that face the same way as point i, ring by ring through the grid.
-Neighbours find_neighbours(const Field& f, uint32_t i) {
-    Neighbours found;
-    const float p[3] = {f.x[i], f.y[i], f.z[i]};
-    int at[3];
-    for (int a = 0; a < 3; ++a) at[a] = int(cell_of(p[a], f.grid_origin[a], f.grid_cell, f.grid_size[a]));
-    const int last_ring = int(std::max({f.grid_size[0], f.grid_size[1], f.grid_size[2]}));
-    for (int ring = 0; ring <= std::min(last_ring, 8); ++ring) {
-        // All of ring r lies beyond (r − 1) cells.
-        const float beyond = float(std::max(0, ring - 1)) * f.grid_cell;
-        if (found.count == most_neighbours && found.d2[found.count - 1] < beyond * beyond) break;
-        for (int z = std::max(0, at[2] - ring); z <= std::min(int(f.grid_size[2]) - 1, at[2] + ring); ++z)
-            for (int y = std::max(0, at[1] - ring); y <= std::min(int(f.grid_size[1]) - 1, at[1] + ring); ++y) {
-                const bool face = std::abs(z - at[2]) == ring || std::abs(y - at[1]) == ring;
-                const int step = face ? 1 : std::max(1, 2 * ring);
-                for (int x = at[0] - ring; x <= at[0] + ring; x += step) {
-                    if (x < 0 || x >= int(f.grid_size[0])) continue;
-                    const uint32_t cell = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0] + uint32_t(x);
-                    for (uint32_t j = f.cell_start[cell]; j < f.cell_start[cell + 1]; ++j) {
-                        if (j == i) continue;
-                        const float dx = f.x[j] - p[0], dy = f.y[j] - p[1], dz = f.z[j] - p[2];
-                        const float d2 = dx * dx + dy * dy + dz * dz;
-                        found.offer_any(d2);
-                        if (f.nx[j] * f.nx[i] + f.ny[j] * f.ny[i] + f.nz[j] * f.nz[i] >= same_side) found.offer(j, d2);
-                    }
-                }
+/// The points of a box of grid cells, side by side: points of one cell share them.
+struct Surroundings {
+    static constexpr uint32_t capacity = 256;
+    uint32_t count = 0, id[capacity];
+    alignas(64) float x[capacity], y[capacity], z[capacity], nx[capacity], ny[capacity], nz[capacity];
+    int32_t cell[3] = {-1, -1, -1}, reach = 0;
+    bool whole, complete;  // the box holds the grid; the box's points fit
+
+    void begin(const Field& f, const int32_t at[3], int32_t far) {
+        std::memcpy(cell, at, sizeof(cell));
+        reach = far, count = 0, complete = true;
+        for_rows(f, [&](uint32_t first, uint32_t last) { complete = complete && add(f, first, last); });
+    }
+    /// Work(first, last): sorted points, row by row of the box.
+    template <typename Work>
+    void for_rows(const Field& f, Work&& work) {
+        int32_t from[3], to[3];
+        whole = true;
+        for (int a = 0; a < 3; ++a) {
+            from[a] = std::max(0, cell[a] - reach), to[a] = std::min(int32_t(f.grid_size[a]) - 1, cell[a] + reach);
+            whole = whole && to[a] - from[a] + 1 == int32_t(f.grid_size[a]);
+        }
+        for (int32_t z = from[2]; z <= to[2]; ++z)
+            for (int32_t y = from[1]; y <= to[1]; ++y) {
+                const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
+                const uint32_t first = f.cell_start[row + uint32_t(from[0])], last = f.cell_start[row + uint32_t(to[0]) + 1];
+                if (first < last) work(first, last);
             }
     }
+    bool add(const Field& f, uint32_t first, uint32_t last) {
+        if (last - first > capacity - count) return false;
+        for (uint32_t j = first; j < last; ++j, ++count) {
+            x[count] = f.x[j], y[count] = f.y[j], z[count] = f.z[j];
+            nx[count] = f.nx[j], ny[count] = f.ny[j], nz[count] = f.nz[j], id[count] = j;
+        }
+        return true;
+    }
+    /// Those within the ball of squared radius `bound`.
+    void offer_all(const Field& f, uint32_t i, float bound, Neighbours& found) {
+        const float px = f.x[i], py = f.y[i], pz = f.z[i], px_n = f.nx[i], py_n = f.ny[i], pz_n = f.nz[i];
+        for (uint32_t c = 0; c < count; ++c) {
+            const float dx = x[c] - px, dy = y[c] - py, dz = z[c] - pz;
+            d2[c] = dx * dx + dy * dy + dz * dz;
+            agree[c] = nx[c] * px_n + ny[c] * py_n + nz[c] * pz_n;
+        }
+        uint32_t close = 0;
+        for (uint32_t c = 0; c < count; ++c) {  // no branch: who is close is past foretelling
+            place[close] = c;
+            close += (d2[c] < bound) & (id[c] != i);
+        }
+        for (uint32_t k = 0; k < close; ++k) {
+            const uint32_t c = place[k];
+            found.offer_any(d2[c]);
+            if (agree[c] >= same_side) found.offer(id[c], d2[c]);
+        }
+    }
+    float d2[capacity], agree[capacity];
+    uint32_t place[capacity + 1];
+    float guess = 1e30f;  ///< of the squared radius that holds all neighbours, from the last point; changes no result
+};
+
+Neighbours offer_box(const Field& f, uint32_t i, float bound, Surroundings& around) {
+    Neighbours found;
+    if (around.complete) {
+        around.offer_all(f, i, bound, found);
+        return found;
+    }
+    around.count = 0;  // a crowd: part by part
+    around.for_rows(f, [&](uint32_t first, uint32_t last) {
+        for (uint32_t some; first < last; first += some) {
+            some = std::min(last - first, Surroundings::capacity);
+            if (around.add(f, first, first + some)) continue;
+            around.offer_all(f, i, bound, found);
+            around.count = some = 0;
+        }
+    });
+    around.offer_all(f, i, bound, found);
     return found;
+}
+
+/// The nearest points that face the same way as point i: those of a box of grid cells around its own, which grows
+/// until it holds the ball that they span.
+Neighbours find_neighbours(const Field& f, uint32_t i, Surroundings& around) {
+    constexpr int32_t first_reach = 2, last_reach = 8;
+    const float p[3] = {f.x[i], f.y[i], f.z[i]};
+    int32_t at[3];
+    for (int a = 0; a < 3; ++a) at[a] = int32_t(cell_of(p[a], f.grid_origin[a], f.grid_cell, f.grid_size[a]));
+    // A box that had to grow for another point of the cell serves as well: the nearest are the nearest.
+    if (std::memcmp(at, around.cell, sizeof(at)) != 0) around.begin(f, at, first_reach);
+    for (;; around.begin(f, at, around.reach + 1)) {
+        Neighbours found = offer_box(f, i, around.guess, around);
+        if (found.count < most_neighbours) found = offer_box(f, i, 1e30f, around);
+        const float ball = float(around.reach) * f.grid_cell;  // the own cell lies between
+        const bool full = found.count == most_neighbours, enough = full && found.d2[found.count - 1] <= ball * ball;
+        if (full) around.guess = 2 * found.d2[found.count - 1];
+        if (enough || around.whole || around.reach >= last_reach) return found;
+    }
 }
 
 /// Distance within which `support_neighbour` neighbours' worth of activity lies; interpolated, so that it
@@ -238,8 +309,8 @@ bool solve3(const float m[6], const float r[3], float out[3]) {
     return true;
 }
 
-void fit_patch(Field& f, uint32_t i) {
-    const Neighbours neighbours = find_neighbours(f, i);
+void fit_patch(Field& f, uint32_t i, Surroundings& around_it) {
+    const Neighbours neighbours = find_neighbours(f, i, around_it);
     // A lone point of its side must not reach across its whole surroundings.
     const float around = std::sqrt(neighbours.any[support_neighbour - 1]);
     // And a droplet of a few points must not take its measure from the next droplet.
@@ -291,21 +362,44 @@ void fit_patch(Field& f, uint32_t i) {
                     f.steep[i], f.activity[i], 1 / f.activity[i], 0};
 }
 
-void close_cluster(Field& f, Cluster& k) {
+struct Disc {
+    float centre[3], area[3], size, radius;  ///< size: of all areas, whatever their direction
+};
+
+/// One disc in place of `count`. Their areas give the centre; the ball holds them all.
+template <typename Of>
+Cluster joined(uint32_t first, uint32_t last, Of&& disc) {
+    Cluster k{};
+    k.first = first, k.last = last;
     float total = 0, furthest = 0;
-    for (uint32_t m = k.first; m < k.last; ++m) {
-        const uint32_t j = f.cluster_member[m];
-        const float area = f.area[j], p[3] = {f.x[j], f.y[j], f.z[j]}, n[3] = {f.nx[j], f.ny[j], f.nz[j]};
-        for (int a = 0; a < 3; ++a) k.centre[a] += area * p[a], k.area[a] += area * n[a];
-        total += area;
+    for (uint32_t m = first; m < last; ++m) {
+        const Disc d = disc(m);
+        for (int a = 0; a < 3; ++a) k.centre[a] += d.size * d.centre[a], k.area[a] += d.area[a];
+        total += d.size;
     }
     for (float& x : k.centre) x /= std::max(total, 1e-30f);
-    for (uint32_t m = k.first; m < k.last; ++m) {
-        const uint32_t j = f.cluster_member[m];
-        const float d[3] = {f.x[j] - k.centre[0], f.y[j] - k.centre[1], f.z[j] - k.centre[2]};
-        furthest = std::max(furthest, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (uint32_t m = first; m < last; ++m) {
+        const Disc d = disc(m);
+        const float r[3] = {d.centre[0] - k.centre[0], d.centre[1] - k.centre[1], d.centre[2] - k.centre[2]};
+        furthest = std::max(furthest, std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + d.radius);
     }
-    k.radius = std::sqrt(furthest);
+    k.limit = from_afar * furthest * furthest;
+    return k;
+}
+Cluster join_points(const Field& f, uint32_t first, uint32_t last) {
+    return joined(first, last, [&](uint32_t m) {
+        const uint32_t j = f.cluster_member[m];
+        const float area = f.area[j];
+        return Disc{{f.x[j], f.y[j], f.z[j]}, {area * f.nx[j], area * f.ny[j], area * f.nz[j]}, area, 0};
+    });
+}
+Cluster join_clusters(const Field& f, uint32_t first, uint32_t last) {
+    return joined(first, last, [&](uint32_t m) {
+        const Cluster& k = f.clusters[m];
+        const float size = std::sqrt(k.area[0] * k.area[0] + k.area[1] * k.area[1] + k.area[2] * k.area[2]);
+        return Disc{{k.centre[0], k.centre[1], k.centre[2]}, {k.area[0], k.area[1], k.area[2]}, size,
+                    std::sqrt(k.limit / from_afar)};
+    });
 }
 
 /// Points of the grid cells of one block, row by row.
@@ -320,19 +414,29 @@ uint32_t list_block(Field& f, const uint32_t block[3], uint32_t at) {
     return at;
 }
 
+/// Work(corner) for the blocks of `step` grid cells a side in [from, to).
+template <typename Work>
+void for_blocks(const uint32_t from[3], const uint32_t to[3], uint32_t step, Work&& work) {
+    uint32_t block[3];
+    for (block[2] = from[2]; block[2] < to[2]; block[2] += step)
+        for (block[1] = from[1]; block[1] < to[1]; block[1] += step)
+            for (block[0] = from[0]; block[0] < to[0]; block[0] += step) work(block);
+}
+
 void build_clusters(Field& f) {
-    uint32_t listed = 0, block[3];
-    for (block[2] = 0; block[2] < f.grid_size[2]; block[2] += cluster_cells)
-        for (block[1] = 0; block[1] < f.grid_size[1]; block[1] += cluster_cells)
-            for (block[0] = 0; block[0] < f.grid_size[0]; block[0] += cluster_cells) {
-                const uint32_t end = list_block(f, block, listed);
-                for (; listed < end; listed = std::min(listed + cluster_size, end)) {
-                    Cluster& k = f.clusters[f.cluster_count++];
-                    k = {};
-                    k.first = listed, k.last = std::min(listed + cluster_size, end);
-                    close_cluster(f, k);
-                }
-            }
+    uint32_t listed = 0;
+    const uint32_t origin[3] = {0, 0, 0};
+    for_blocks(origin, f.grid_size, group_cells, [&](const uint32_t group[3]) {
+        const uint32_t first = f.cluster_count;
+        uint32_t to[3];
+        for (int a = 0; a < 3; ++a) to[a] = std::min(group[a] + group_cells, f.grid_size[a]);
+        for_blocks(group, to, cluster_cells, [&](const uint32_t block[3]) {
+            const uint32_t end = list_block(f, block, listed);
+            for (; listed < end; listed = std::min(listed + cluster_size, end))
+                f.clusters[f.cluster_count++] = join_points(f, listed, std::min(listed + cluster_size, end));
+        });
+        if (f.cluster_count > first) f.groups[f.group_count++] = join_clusters(f, first, f.cluster_count);
+    });
 }
 
 }  // namespace
@@ -340,7 +444,7 @@ void build_clusters(Field& f) {
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
     return aligned(points * sizeof(Patch)) + 13 * aligned((points + lanes) * sizeof(float)) + 2 * aligned(points * sizeof(uint32_t)) +
            15 * aligned(drops * sizeof(float)) + aligned((grid_capacity(points) + 1) * sizeof(uint32_t)) +
-           aligned(cluster_capacity(points) * sizeof(Cluster));
+           2 * aligned(cluster_capacity(points) * sizeof(Cluster));
 }
 
 void begin_field(Field& field, void* memory, const format::PointSet& points,
@@ -354,7 +458,8 @@ void begin_field(Field& field, void* memory, const format::PointSet& points,
 }
 
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
-    for (uint32_t i = first; i < last; ++i) fit_patch(field, i);
+    Surroundings around;
+    for (uint32_t i = first; i < last; ++i) fit_patch(field, i, around);
 }
 
 void finish_field(Field& f) noexcept {

@@ -23,11 +23,11 @@ struct Box {
     float lower[3], upper[3];
 };
 
-/// Points of one region as a single oriented disc, for the winding number.
+/// Points of one region, or clusters of a wider one, as a single oriented disc, for the winding number.
 struct Cluster {
     float centre[3], area[3];  ///< area: Σ area · normal / 4π
-    float radius;              ///< of a ball round the centre that holds them
-    uint32_t first, last;      ///< into Field::cluster_member
+    float limit;               ///< squared distance from which it counts as one disc
+    uint32_t first, last;      ///< into Field::cluster_member, or Field::clusters
 };
 
 struct Kernels;
@@ -59,9 +59,9 @@ struct Field {
     uint32_t* cell_start;
     uint32_t grid_size[3];
     float grid_origin[3], grid_cell;
-    Cluster* clusters;
+    Cluster *clusters, *groups;
     uint32_t* cluster_member;              ///< sorted points, cluster by cluster
-    uint32_t cluster_count;
+    uint32_t cluster_count, group_count;
     const Kernels* kernels;                ///< what evaluation runs on
     float largest_support, largest_reach;  ///< over points; over drops
     float lower[3], upper[3];              ///< of everything with weight

@@ -153,11 +153,14 @@ struct Evaluation {
         if (count)
             f.kernels->blend(f, list, count, batch);
         else
-            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0;
-        for (uint32_t l = 0; l < n; ++l) out.value[first + l] = batch.value[l];
+            for (uint32_t l = 0; l < lanes; ++l)
+                batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0, batch.doubt[l] = 1;
+        std::copy(batch.value, batch.value + n, out.value + first);
         if (out.gx) write_slopes(count, n, first);
-        for (uint32_t l = 0; f.point_count && l < n; ++l)
-            if (batch.u2[l] > trusted) doubts.add(batch, l, first + l);
+        int32_t any = 0;
+        for (uint32_t l = 0; l < lanes; ++l) any |= batch.doubt[l];
+        for (uint32_t l = 0; any && f.point_count && l < n; ++l)
+            if (batch.doubt[l]) doubts.add(batch, l, first + l);
     }
     void write_slopes(uint32_t count, uint32_t n, uint32_t first) {
         Slopes sum;

@@ -26,15 +26,15 @@ RILL_INLINE float greater(float a, float b) { return a > b ? a : b; }
 /// 1: a patch that faces the same way as the nearest; 0: opposed to it.
 RILL_INLINE float gate_of(float agree) { return lesser(greater((agree - opposed) * gate_scale, 0), 1); }
 
-/// (1 − u)² / u².
+/// (1 − u²)³ / u²: needs no root, and on real liquids its normals are 2 % nearer to the source's than (1 − u)² / u².
 RILL_INLINE float weight_of(float u2, float activity) {
-    const float v = 1 - std::sqrt(lesser(u2, 1));
-    return activity * (v * v) / (u2 + soften);
+    const float c = greater(1 - u2, 0);
+    return activity * (c * c * c) / (u2 + soften);
 }
-/// Its derivative by u², halved.
+/// Half its derivative by u².
 RILL_INLINE float weight_slope_of(float u2, float activity) {
-    const float u = std::sqrt(lesser(u2, 1)), v = 1 - u, s = 1 / (u2 + soften);
-    return -0.5f * activity * v * s * (1 / greater(u, 1e-4f) + v * s);
+    const float c = greater(1 - u2, 0), s = 1 / (u2 + soften);
+    return -0.5f * activity * (c * c) * s * (3 + c * s);
 }
 RILL_INLINE float weight_b_of(float u2, float w, float agree) {
     const float apart = agree < opposed ? w : 0.f;
@@ -65,12 +65,13 @@ RILL_INLINE void find_nearest(const Field& f, const uint32_t* list, uint32_t cou
     }
 }
 
-/// Which side of A the points of B lie on: below, the liquid between them is thin; above, the air is.
-RILL_INLINE void side_of(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const float* height,
-                         float* side) {
-    for (uint32_t l = 0; l < lanes; ++l) side[l] = 0;
+/// Where both clusters have weight: the side of A that the points of B lie on tells whether the liquid between them is
+/// thin (below) or the air is.
+RILL_INLINE void choose_side(const Field& f, const uint32_t* list, uint32_t count, const float* height,
+                             const float* weight_b, const float* sum_b, Batch& b) {
+    alignas(64) float side[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
-        const Patch p = f.patches[list[c]];
+        const Patch& p = f.patches[list[c]];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
             const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
@@ -80,11 +81,21 @@ RILL_INLINE void side_of(const Field& f, const uint32_t* list, uint32_t count, c
             side[l] += weight_b_of(u2, weight_of(u2, p.activity), agree) * (height[l] - along);
         }
     }
+    for (uint32_t l = 0; l < lanes; ++l) {
+        const float some = weight_b[l] > 0 ? weight_b[l] : 1.f, value = sum_b[l] / some, a = b.value[l];
+        // Thin liquid: intersection, max; thin air: union, min.
+        const float gain = side[l] < 0 ? value - a : a - value, better = b.sign[l] != 0 ? gain : 1.f;
+        const float take = weight_b[l] > 0 ? better : 0.f;
+        b.value[l] = take > 0 ? value : a, b.weight[l] = take > 0 ? weight_b[l] : b.weight[l];
+        b.sign[l] = take > 0 ? -1.f : b.sign[l];
+        b.doubt[l] = take > 0 ? int32_t(b.u2[l] > trusted) : b.doubt[l];
+    }
 }
 
 RILL_INLINE void blend(const Field& f, const uint32_t* list, uint32_t count, Batch& b) {
-    alignas(64) float height[lanes], side[lanes];
+    alignas(64) float height[lanes];
     alignas(64) float weight_a[lanes] = {}, sum_a[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {};
+    alignas(64) float voters[lanes] = {}, inside[lanes] = {};  // of A: how many, and the weight of those who say liquid
     find_nearest(f, list, count, b, height);
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];
@@ -97,23 +108,20 @@ RILL_INLINE void blend(const Field& f, const uint32_t* list, uint32_t count, Bat
             const float wa = w * (gate * gate), wb = weight_b_of(u2, w, agree);
             weight_a[l] += wa, sum_a[l] += wa * g;
             weight_b[l] += wb, sum_b[l] += wb * g;
+            voters[l] += wa > 0 ? 1.f : 0.f, inside[l] += g < 0 ? wa : 0.f;
         }
     }
-    float any_b = 0;
+    int32_t any_b = 0;
     for (uint32_t l = 0; l < lanes; ++l) {
-        const bool has = weight_a[l] > 0;
-        b.value[l] = has ? sum_a[l] / weight_a[l] : unsupported;
-        b.weight[l] = weight_a[l], b.sign[l] = has ? 1.f : 0.f;
-        any_b += weight_b[l];
+        const float weight = weight_a[l], some = weight > 0 ? weight : 1.f, value = sum_a[l] / some;
+        b.value[l] = weight > 0 ? value : unsupported;
+        b.weight[l] = weight, b.sign[l] = weight > 0 ? 1.f : 0.f;
+        const float against = value < 0 ? weight - inside[l] : inside[l];
+        const int32_t agreed = (voters[l] >= enough_voters) & (against <= few_against * weight);
+        b.doubt[l] = (b.u2[l] > trusted) & ~agreed;
+        any_b |= weight_b[l] > 0;
     }
-    if (any_b > 0) side_of(f, list, count, b, height, side);
-    for (uint32_t l = 0; any_b > 0 && l < lanes; ++l) {
-        if (!(weight_b[l] > 0)) continue;
-        const float value = sum_b[l] / weight_b[l];
-        // Thin liquid: intersection, max; thin air: union, min.
-        if (b.sign[l] != 0 && !(side[l] < 0 ? value > b.value[l] : value < b.value[l])) continue;
-        b.value[l] = value, b.weight[l] = weight_b[l], b.sign[l] = -1;
-    }
+    if (any_b) choose_side(f, list, count, height, weight_b, sum_b, b);
     for (uint32_t l = 0; l < lanes; ++l) b.u2[l] = b.sign[l] == 0 ? unsupported : b.u2[l];
 }
 
@@ -147,58 +155,89 @@ RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, con
     }
 }
 
-/// Winding number of the points as oriented discs at each position (Barill et al. 2018): about 1 in the liquid, 0 in
-/// the air. Which lanes see a cluster from afar is decided lane by lane: the batch must not matter.
-RILL_INLINE void winding(const Field& f, const float* x, const float* y, const float* z, float* number,
-                         float* distance2) {
-    alignas(64) float sum[lanes] = {}, near[lanes], nearest[lanes];
-    for (uint32_t l = 0; l < lanes; ++l) nearest[l] = unsupported;
-    for (uint32_t c = 0; c < f.cluster_count; ++c) {
-        const Cluster k = f.clusters[c];
-        const float limit = from_afar * k.radius * k.radius;
-        float any = 0;
+/// About 1 / √x³, to half a percent, the same on every machine: a guess from the exponent and one Newton step.
+RILL_INLINE float inverse_cube_root_squared(float x) {
+    uint32_t bits;
+    float y;
+    std::memcpy(&bits, &x, sizeof(bits));
+    bits = 0x5f375a86u - (bits >> 1);
+    std::memcpy(&y, &bits, sizeof(y));
+    y = y * (1.5f - 0.5f * x * y * y);
+    return y * y * y;
+}
+
+/// Sums of discs at sixteen positions.
+struct Discs {
+    alignas(64) float x[lanes], y[lanes], z[lanes], sum[lanes], nearest[lanes];
+
+    /// For the lanes whose `share` is 1, not 0.
+    RILL_INLINE void add(float cx, float cy, float cz, float ax, float ay, float az, const float* share) {
+        for (uint32_t l = 0; l < lanes; ++l) {
+            const float rx = cx - x[l], ry = cy - y[l], rz = cz - z[l];
+            const float d2 = rx * rx + ry * ry + rz * rz + 1e-20f;
+            sum[l] += share[l] * ((ax * rx + ay * ry + az * rz) * inverse_cube_root_squared(d2));
+            nearest[l] = lesser(share[l] > 0 ? d2 : unsupported, nearest[l]);
+        }
+    }
+    /// Adds a cluster for those of the lanes `asked` that see it from afar. True when some do not; they are `near`.
+    /// Who does is decided lane by lane: the batch must not matter.
+    RILL_INLINE bool add_from_afar(const Cluster& k, const float* asked, float* near) {
+        alignas(64) float afar[lanes];
+        int32_t any_near = 0, any_afar = 0;
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = k.centre[0] - x[l], ry = k.centre[1] - y[l], rz = k.centre[2] - z[l];
-            const float d2 = rx * rx + ry * ry + rz * rz, share = k.area[0] * rx + k.area[1] * ry + k.area[2] * rz;
-            near[l] = d2 > limit ? 0.f : 1.f;
-            nearest[l] = lesser(d2 > limit ? d2 : unsupported, nearest[l]);
-            sum[l] += d2 > limit ? share / (d2 * std::sqrt(d2)) : 0.f;
+            const bool is_near = rx * rx + ry * ry + rz * rz < k.limit;
+            near[l] = is_near ? asked[l] : 0.f, afar[l] = is_near ? 0.f : asked[l];
+            any_near |= near[l] > 0, any_afar |= afar[l] > 0;
         }
-        for (uint32_t l = 0; l < lanes; ++l) any += near[l];
-        if (any == 0) continue;
-        for (uint32_t m = k.first; m < k.last; ++m) {
-            const uint32_t j = f.cluster_member[m];
-            const Patch p = f.patches[j];
-            const float area = f.area[j];
-            for (uint32_t l = 0; l < lanes; ++l) {
-                const float rx = p.x - x[l], ry = p.y - y[l], rz = p.z - z[l];
-                const float d2 = rx * rx + ry * ry + rz * rz + 1e-20f;
-                nearest[l] = lesser(near[l] > 0 ? d2 : unsupported, nearest[l]);
-                sum[l] += near[l] * (area * (p.nx * rx + p.ny * ry + p.nz * rz)) / (d2 * std::sqrt(d2));
+        if (any_afar) add(k.centre[0], k.centre[1], k.centre[2], k.area[0], k.area[1], k.area[2], afar);
+        return any_near;
+    }
+};
+
+/// Winding number of the points as oriented discs at each position (Barill et al. 2018): about 1 in the liquid, 0 in
+/// the air.
+RILL_INLINE void winding(const Field& f, const float* x, const float* y, const float* z, float* number,
+                         float* distance2) {
+    Discs discs;
+    alignas(64) float all[lanes], near_group[lanes], near[lanes];
+    for (uint32_t l = 0; l < lanes; ++l) {
+        discs.x[l] = x[l], discs.y[l] = y[l], discs.z[l] = z[l];
+        discs.sum[l] = 0, discs.nearest[l] = unsupported, all[l] = 1;
+    }
+    for (uint32_t g = 0; g < f.group_count; ++g) {
+        if (!discs.add_from_afar(f.groups[g], all, near_group)) continue;
+        for (uint32_t c = f.groups[g].first; c < f.groups[g].last; ++c) {
+            const Cluster& k = f.clusters[c];
+            if (!discs.add_from_afar(k, near_group, near)) continue;
+            for (uint32_t m = k.first; m < k.last; ++m) {
+                const uint32_t j = f.cluster_member[m];
+                const Patch& p = f.patches[j];
+                const float area = f.area[j];
+                discs.add(p.x, p.y, p.z, area * p.nx, area * p.ny, area * p.nz, near);
             }
         }
     }
-    for (uint32_t l = 0; l < lanes; ++l) number[l] = sum[l], distance2[l] = nearest[l];
+    for (uint32_t l = 0; l < lanes; ++l) number[l] = discs.sum[l], distance2[l] = discs.nearest[l];
 }
 
 /// Interval arithmetic in the very order in which the kernels compute u²: no point with weight anywhere in the box is
 /// missed, not even by rounding.
 RILL_INLINE void reach(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],
                        float* least) {
-    const float *px = point[0], *py = point[1], *pz = point[2], *nx = point[3], *ny = point[4], *nz = point[5];
-    const float* inverse = point[6];
     for (uint32_t first = 0; first < n; first += lanes) {
+        const float *px = point[0] + first, *py = point[1] + first, *pz = point[2] + first;
+        const float *nx = point[3] + first, *ny = point[4] + first, *nz = point[5] + first, *inverse = point[6] + first;
         alignas(64) float u2[lanes];
         for (uint32_t l = 0; l < lanes; ++l) {
-            const uint32_t i = first + l;
-            const float ax = lower[0] - px[i], ay = lower[1] - py[i], az = lower[2] - pz[i];
-            const float bx = upper[0] - px[i], by = upper[1] - py[i], bz = upper[2] - pz[i];
+            const float ax = lower[0] - px[l], ay = lower[1] - py[l], az = lower[2] - pz[l];
+            const float bx = upper[0] - px[l], by = upper[1] - py[l], bz = upper[2] - pz[l];
             const float dx = greater(greater(ax, -bx), 0), dy = greater(greater(ay, -by), 0), dz = greater(greater(az, -bz), 0);
-            const float lx = nx[i] * ax, ly = ny[i] * ay, lz = nz[i] * az, hx = nx[i] * bx, hy = ny[i] * by, hz = nz[i] * bz;
+            const float lx = nx[l] * ax, ly = ny[l] * ay, lz = nz[l] * az, hx = nx[l] * bx, hy = ny[l] * by, hz = nz[l] * bz;
             const float low = lesser(lx, hx) + lesser(ly, hy) + lesser(lz, hz);
             const float high = greater(lx, hx) + greater(ly, hy) + greater(lz, hz);
             const float h = greater(greater(low, -high), 0);
-            u2[l] = (dx * dx + dy * dy + dz * dz + flatten * h * h) * inverse[i];
+            u2[l] = (dx * dx + dy * dy + dz * dz + flatten * h * h) * inverse[l];
         }
         std::memcpy(least + first, u2, sizeof(u2));
     }

@@ -16,6 +16,7 @@ struct alignas(64) Batch {
     float sign[lanes];                  ///< 1: the value is that of cluster A, −1: of B, 0: of none
     float u2[lanes];  ///< least of any patch; `unsupported` for none: in a thin sheet the nearest may be of the other face
     float nx[lanes], ny[lanes], nz[lanes];  ///< normal of the nearest point
+    int32_t doubt[lanes];  ///< 1: the winding number should be asked, 0
 };
 /// Sums over the patches of the chosen cluster, still to be divided by the weight.
 struct alignas(64) Slopes {

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// A sequence is cooked in spans: runs of windows that know nothing of each other. Tracks start afresh in each, and each
+// closes its own error loop, so spans can be cooked on any machine, in any order, and an interrupted cook goes on
+// from those it has.
+#pragma once
+#include <algorithm>
+#include <cstdint>
+
+namespace rill::cooker {
+
+/// Measured, see README.md "Spans": what starting afresh costs.
+inline constexpr uint32_t windows_per_span = 4;
+
+struct SpanPlan {
+    uint32_t frames = 1, window = 24;  ///< frames a window spans (it touches one more)
+
+    uint32_t length() const { return windows_per_span * window; }
+    /// A rest of less than half a span belongs to the span before.
+    uint32_t spans() const { return std::max(1u, (frames - 1 + length() / 2) / length()); }
+    /// Frame indices, inclusive. Neighbours share their border frame, as windows do.
+    uint32_t first(uint32_t span) const { return span * length(); }
+    uint32_t last(uint32_t span) const { return span + 1 == spans() ? frames - 1 : first(span + 1); }
+};
+/// Segment `index` of `count`, counted from 0: spans first … end − 1. May be none when there are fewer spans than segments.
+struct SpanRange {
+    uint32_t first = 0, end = 0;
+};
+inline SpanRange segment_of(const SpanPlan& plan, uint32_t index, uint32_t count) {
+    const uint64_t spans = plan.spans();
+    return {uint32_t(spans * index / count), uint32_t(spans * (index + 1) / count)};
+}
+
+}  // namespace rill::cooker
