@@ -1,98 +1,139 @@
 // SPDX-License-Identifier: MIT
-// Progressive order: every prefix of layers is an even covering of the surface, in every frame of the window.
-//
-// Sample elimination over lives (after Yuksel 2015): layer l takes a track when somewhere in its life nothing taken
-// before lies within so many local spacings that about 2^(l − last) of all are taken, long lives first. Spacing is relative, so every layer keeps the
-// adaptivity of the whole set.
+// Progressive order: every prefix of layers is a surface of its own in every frame of the window, the best we know
+// of its size. The decoder is in the loop: what has been taken so far is decoded, what it leaves wrong at the
+// tracks still to come says which of them are worth their bytes, over their whole lives.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "parallel.h"
 #include "pipeline.h"
 
 namespace rill::cooker {
 namespace {
 
-constexpr int frame_stride = 4;     // of the frames that are looked at; the ends always are
-constexpr size_t most_neighbours = 48;
+constexpr int frame_stride = 3;        // of the frames that are looked at; the ends always are
 constexpr float same_side = 0.3f;
+constexpr float growth = 1.5f;         // of what is taken, from one round to the next
+constexpr float room = 0.6f;           // of the distance to what was taken before: no two of a round are nearer
+constexpr size_t least_taken = 24;     // tracks in layer 0, where there are so many
+constexpr float least_share = 0.11f;   // of the cost: layer 0
 
-/// One track at one looked-at frame: its neighbours by distance, relative to its spacing.
-struct Standing {
-    std::vector<std::pair<uint32_t, float>> neighbours;
+/// All tracks alive at one looked-at frame.
+struct Look {
+    std::vector<uint32_t> ids;          ///< of the tracks, ascending
+    std::vector<SurfacePoint> points;
+    std::vector<float> need;            ///< of those not taken yet: what taking it would mend, m³; of the rest 0
+    std::vector<float> distance;        ///< to the nearest taken point on its side, metres
+    float scale;                        ///< across all of it, metres
 };
 
-std::vector<std::vector<Standing>> standings(const Window& window) {
-    std::vector<std::vector<Standing>> result(window.paths.size());
-    for (int s = 0;; s = std::min(s + frame_stride, window.samples() - 1)) {
-        std::vector<glm::vec3> positions, normals;
-        std::vector<uint32_t> ids;
-        for (uint32_t i = 0; i < window.paths.size(); ++i) {
-            const Path& path = window.paths[i];
-            // A short life between looked-at frames is looked at once, at its birth.
-            const bool brief = path.birth / frame_stride == path.death / frame_stride && path.birth % frame_stride != 0;
-            if (!path.alive(s) && !(brief && s == path.birth / frame_stride * frame_stride)) continue;
-            const SurfacePoint& p = path.at[size_t(std::clamp(s, path.birth, path.death) - path.birth)];
-            positions.push_back(p.position), normals.push_back(p.normal), ids.push_back(i);
+std::vector<Look> looks_of(const std::vector<TrackSamples>& tracks, int samples) {
+    std::vector<Look> looks;
+    for (int s = 0;; s = std::min(s + frame_stride, samples - 1)) {
+        Look look;
+        glm::vec3 lower(1e30f), upper(-1e30f);
+        for (uint32_t i = 0; i < tracks.size(); ++i) {
+            const TrackSamples& track = tracks[i];
+            if (track.drop || s < track.birth || s > track.death) continue;
+            const size_t k = size_t(s - track.birth);
+            look.ids.push_back(i), look.points.push_back({track.position[k], track.normal[k], {}});
+            lower = glm::min(lower, track.position[k]), upper = glm::max(upper, track.position[k]);
         }
-        const VertexTree tree(positions);
-        std::vector<VertexTree::Found> found;
-        for (size_t k = 0; k < ids.size(); ++k) {
-            tree.nearest(positions[k], most_neighbours, found);
-            Standing standing;
-            float spacing = 0;
-            for (const auto& f : found) {
-                if (f.vertex == k || glm::dot(normals[f.vertex], normals[k]) < same_side) continue;
-                standing.neighbours.emplace_back(ids[f.vertex], std::sqrt(f.distance2));
-                if (standing.neighbours.size() == 4) spacing = std::sqrt(f.distance2);
-            }
-            if (spacing <= 0 && !standing.neighbours.empty()) spacing = standing.neighbours.back().second;
-            for (auto& [id, distance] : standing.neighbours) distance /= std::max(spacing, 1e-9f);
-            result[ids[k]].push_back(std::move(standing));
-        }
-        if (s == window.samples() - 1) break;
+        look.scale = look.ids.empty() ? 0 : 0.5f * glm::distance(lower, upper);
+        looks.push_back(std::move(look));
+        if (s >= samples - 1) return looks;
     }
-    return result;
 }
 
-/// Takes every track that stands anywhere with nothing taken within `room` spacings; returns how many are taken.
-size_t cover(const std::vector<std::vector<Standing>>& standing, const std::vector<uint32_t>& order, float room,
-             std::vector<bool>& taken) {
-    for (uint32_t i : order) {
-        if (taken[i]) continue;
-        taken[i] = std::any_of(standing[i].begin(), standing[i].end(), [&](const Standing& at) {
-            return std::none_of(at.neighbours.begin(), at.neighbours.end(), [&](const auto& neighbour) {
-                return taken[neighbour.first] && neighbour.second < room;
-            });
-        });
+/// What the taken tracks leave wrong at the others: volume, of about the error over the room a point would fill.
+void look_again(Look& look, const std::vector<bool>& taken) {
+    std::vector<SurfacePoint> points, others;
+    std::vector<glm::vec3> positions;
+    for (size_t k = 0; k < look.ids.size(); ++k)
+        if (taken[look.ids[k]]) points.push_back(look.points[k]), positions.push_back(look.points[k].position);
+        else others.push_back(look.points[k]);
+    const Surplus left = measure_places(points, others);
+    const VertexTree tree(positions);
+    std::vector<VertexTree::Found> found;
+    look.need.assign(look.ids.size(), 0), look.distance.assign(look.ids.size(), look.scale);
+    for (size_t k = 0, other = 0; k < look.ids.size(); ++k) {
+        if (taken[look.ids[k]]) continue;
+        if (!positions.empty()) tree.nearest(look.points[k].position, 8, found);
+        for (const auto& f : found)
+            if (glm::dot(points[f.vertex].normal, look.points[k].normal) > same_side) {
+                look.distance[k] = std::min(look.distance[k], std::sqrt(f.distance2));
+                break;
+            }
+        // A point that faces another way than the surface there is as wrong as one beside it.
+        const float d = look.distance[k], error = left.distance[other] + 0.1f * d * std::min(left.angle[other], 1.f);
+        look.need[k] = std::min(d, error) * d * d;
+        ++other;
     }
-    return size_t(std::count(taken.begin(), taken.end(), true));
+}
+
+/// Tracks of one round, until their cost comes to `budget`: the most mended per cost first.
+void take_round(const std::vector<Look>& looks, const std::vector<float>& cost, float budget, std::vector<bool>& taken) {
+    struct Stand {
+        uint32_t look, place;
+    };
+    std::vector<std::vector<Stand>> stands(cost.size());
+    std::vector<float> gain(cost.size(), 0.f);
+    for (uint32_t l = 0; l < looks.size(); ++l)
+        for (uint32_t k = 0; k < looks[l].ids.size(); ++k) {
+            const uint32_t id = looks[l].ids[k];
+            if (!(looks[l].need[k] > 0)) continue;
+            stands[id].push_back({l, k}), gain[id] += looks[l].need[k] / cost[id];
+        }
+    std::vector<uint32_t> order;
+    for (uint32_t i = 0; i < cost.size(); ++i)
+        if (gain[i] > 0) order.push_back(i);
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return gain[a] != gain[b] ? gain[a] > gain[b] : a < b; });
+    std::vector<std::vector<glm::vec3>> fresh(looks.size());
+    for (uint32_t i : order) {
+        // What the others of this round leave of its gain.
+        float left = 0;
+        for (const Stand& at : stands[i]) {
+            const Look& look = looks[at.look];
+            const float r = room * look.distance[at.place];
+            const glm::vec3& p = look.points[at.place].position;
+            const bool near = std::any_of(fresh[at.look].begin(), fresh[at.look].end(), [&](const glm::vec3& q) {
+                const glm::vec3 d = p - q;
+                return glm::dot(d, d) < r * r;
+            });
+            if (!near) left += look.need[at.place] / cost[i];
+        }
+        if (left < 0.5f * gain[i]) continue;
+        taken[i] = true;
+        for (const Stand& at : stands[i]) fresh[at.look].push_back(looks[at.look].points[at.place].position);
+        if ((budget -= cost[i]) <= 0) return;
+    }
 }
 
 }  // namespace
 
-std::vector<uint32_t> assign_layers(const Window& window, uint32_t layers) {
-    const auto standing = standings(window);
-    std::vector<uint32_t> layer(window.paths.size(), layers - 1), order(window.paths.size());
-    std::iota(order.begin(), order.end(), 0u);
-    const auto life = [&](uint32_t i) { return window.paths[i].death - window.paths[i].birth; };
-    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return life(a) > life(b); });
-    std::vector<bool> taken(window.paths.size(), false);
+std::vector<uint32_t> assign_layers(const std::vector<TrackSamples>& tracks, const std::vector<float>& cost, int samples,
+                                    uint32_t layers, int jobs) {
+    std::vector<uint32_t> layer(tracks.size(), layers - 1);
+    std::vector<bool> taken(tracks.size(), false);
+    std::vector<Look> looks = looks_of(tracks, samples);
+    const float all = std::accumulate(cost.begin(), cost.end(), 0.f);
     for (uint32_t l = 0; l + 1 < layers; ++l) {
-        // The room that takes about half as many as the layer after will have in all.
-        const size_t wanted = window.paths.size() >> (layers - 1 - l);
-        float narrow = 0.25f, wide = 8;
-        std::vector<bool> best = taken;
-        for (int step = 0; step < 7; ++step) {
-            const float room = std::sqrt(narrow * wide);
-            std::vector<bool> trial = taken;
-            const size_t count = cover(standing, order, room, trial);
-            (count < wanted ? wide : narrow) = room;
-            best = std::move(trial);
+        const float share = std::max(l == 0 ? 0.f : least_share, std::ldexp(1.f, int(l) + 1 - int(layers)));
+        const float wanted = all * (l == 0 ? std::min(share, least_share) : share);
+        for (;;) {
+            float spent = 0;
+            size_t count = 0;
+            for (size_t i = 0; i < taken.size(); ++i)
+                if (taken[i]) spent += cost[i], ++count;
+            if (spent >= wanted && count >= least_taken) break;
+            parallel_for(looks.size(), jobs, [&](size_t s) { look_again(looks[s], taken); });
+            const float more = count == 0 ? 0.15f * wanted : std::min(wanted - spent, (growth - 1) * spent);
+            take_round(looks, cost, more, taken);
+            if (size_t(std::count(taken.begin(), taken.end(), true)) == count) break;  // nothing is wrong any more
         }
-        for (uint32_t i = 0; i < taken.size(); ++i)
-            if (best[i] && !taken[i]) layer[i] = l;
-        taken = std::move(best);
+        for (size_t i = 0; i < taken.size(); ++i)
+            if (taken[i] && layer[i] == layers - 1) layer[i] = l;
     }
     return layer;
 }

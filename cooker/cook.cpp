@@ -92,7 +92,9 @@ void count_lives(SpanResult& account, const Window& window, bool ends_span) {
 
 void write_window(AssetWriter& writer, uint32_t first_sample, const Window& window, const CodedWindow& coded, const WindowGoal& goal,
                   uint32_t layers, bool ends_span, SpanResult& account) {
-    const std::vector<uint32_t> layer = assign_layers(window, layers);
+    std::vector<float> cost;
+    for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
+    const std::vector<uint32_t> layer = assign_layers(coded.decoded, cost, window.samples(), layers, goal.jobs);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(window, most_tracks_per_block, block_count);
     const std::vector<LayerError> errors = layer_errors(window, coded, layer, layers, goal.jobs);
@@ -326,7 +328,8 @@ struct Job {
 /// The folder of finished spans: gone when the cook is done, kept if there is anything in it when not.
 class WorkFolder {
 public:
-    WorkFolder(const std::string& output, std::string path) : path_(std::move(path)) {
+    WorkFolder(const std::string& output, std::string path, const std::function<void(const std::string&)>& warn)
+        : path_(std::move(path)), warn_(warn) {
         std::error_code error;
         fs::create_directory(path_, error);
         if (error) throw InputError(output + ": cannot be written: " + error.message());
@@ -334,6 +337,7 @@ public:
     ~WorkFolder() {
         std::error_code ignored;
         fs::remove(path_, ignored);  // if it is empty
+        if (warn_ && fs::exists(path_, ignored)) warn_(path_ + ": keeps the finished spans; the same cook goes on from them");
     }
     /// Also what earlier cooks of this output have left, of other input or settings.
     void remove_all(const std::string& output) const {
@@ -352,6 +356,7 @@ public:
 
 private:
     std::string path_;
+    const std::function<void(const std::string&)>& warn_;
 };
 
 /// What every part and the asset say of the cook.
@@ -397,7 +402,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
         report.target_met = true;
         return report;
     }
-    const WorkFolder folder(output, job.folder);
+    const WorkFolder folder(output, job.folder, settings.read.warn);
     const uint32_t frames = job.plan.frames;
     const Survey survey = survey_input(*job.reader, settings.read, settings.survey, job.input_hash, settings.jobs,
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
@@ -424,6 +429,14 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     }
     folder.remove_all(output);
     return report;
+}
+
+void survey(const std::string& input, const CookSettings& settings, const std::function<void(const CookProgress&)>& progress) {
+    check(settings);
+    const auto reader = open_input(input, settings);
+    const uint32_t frames = uint32_t(reader->info().numbers.size());
+    survey_input(*reader, settings.read, settings.survey, known_input(*reader, settings.read, settings.survey, settings.jobs), settings.jobs,
+                 [&](uint32_t done) { progress({done, frames, "surveying"}); });
 }
 
 CookPlan plan_cook(const std::string& input, const std::string& output, const CookSettings& settings) {

@@ -40,6 +40,9 @@ struct CookReport {
 CookReport cook(const std::string& input, const std::string& output, const CookSettings& settings,
                 const std::function<void(const CookProgress&)>& progress);
 
+/// Only makes settings.survey.
+void survey(const std::string& input, const CookSettings& settings, const std::function<void(const CookProgress&)>& progress);
+
 /// What cook() would do.
 struct CookPlan {
     std::string key;               ///< of input, settings and tool: equal keys give equal assets

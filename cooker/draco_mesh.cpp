@@ -42,7 +42,7 @@ std::unique_ptr<draco::Mesh> decode_any(const std::string& bytes, const std::str
 
 }  // namespace
 
-std::string draco_encode(const Mesh& mesh, int bits) {
+std::string draco_encode(const Mesh& mesh, int bits, int velocity_bits) {
     if (mesh.triangles.empty()) return {};
     draco::Mesh target;
     target.set_num_points(uint32_t(mesh.positions.size()));
@@ -57,7 +57,7 @@ std::string draco_encode(const Mesh& mesh, int bits) {
     encoder.SetSpeedOptions(0, 0);
     encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
     encoder.SetAttributeQuantization(draco::GeometryAttribute::POSITION, bits);
-    encoder.SetAttributeQuantization(draco::GeometryAttribute::GENERIC, bits);
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::GENERIC, velocity_bits);
     draco::EncoderBuffer buffer;
     if (const draco::Status status = encoder.EncodeMeshToBuffer(target, &buffer); !status.ok())
         throw InputError(std::string("Draco cannot encode this mesh: ") + status.error_msg());

@@ -8,8 +8,8 @@
 namespace rill::cooker {
 
 /// Edgebreaker at speed 0 (smallest), positions in `bits` bits of the longest side of the bounds; velocity,
-/// when the mesh has it, as a generic attribute in as many bits. An empty mesh gives no bytes.
-std::string draco_encode(const Mesh& mesh, int bits);
+/// when the mesh has it, as a generic attribute in `velocity_bits`. An empty mesh gives no bytes.
+std::string draco_encode(const Mesh& mesh, int bits, int velocity_bits);
 /// Unique ids of attributes as a glTF file states them; -1: find them by kind.
 struct DracoIds {
     int position = -1, velocity = -1;

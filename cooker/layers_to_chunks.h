@@ -54,6 +54,9 @@ QuantisedTrack quantise_track(const TrackSamples& track, const Quantiser& quanti
 TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quantiser,
                               const glm::vec3& origin, const format::BasisTables& tables);
 
+/// What the track will cost, in bits, roughly.
+float rough_bits(const QuantisedTrack& track);
+
 /// Where the bytes went, in bits (fractional: from the coder's probabilities).
 struct ChunkBits {
     double structure = 0, births = 0, motion = 0, normals = 0, drops = 0;

@@ -13,7 +13,7 @@ namespace rill::cooker {
 
 void write_file(const std::filesystem::path& path, std::string_view bytes) {
     std::filesystem::path partial = path;
-    partial += "." + std::to_string(::getpid()) + ".partial";  // several may write the same file: the last wins
+    partial += '.', partial += std::to_string(::getpid()), partial += ".partial";  // several may write one file: the last wins
     errno = 0;
     std::ofstream file(partial, std::ios::binary | std::ios::trunc);
     file.write(bytes.data(), std::streamsize(bytes.size()));

@@ -17,7 +17,8 @@ namespace rill::cooker {
 namespace {
 
 constexpr int sub_steps = 4;
-constexpr float most_off = 0.5f;         // edges that a held point may be off the mesh; at 1.2 twice as many stray pieces
+constexpr float most_off = 0.5f;         // mean edges of the mesh there that a held point may be off it; at 1.2 twice as
+                                        // many stray pieces
 constexpr float least_agreement = 0.2f;  // n·n of a vertex that may hold the point
 
 /// Nearest vertex that faces like `normal`; ~0u if none among the nearest.
@@ -47,10 +48,13 @@ std::optional<SurfacePoint> hold(const SurfaceFrame& frame, const glm::vec3& x, 
     SurfacePoint held{on, n, {}};
     if (!settle(frame, radius, held) || glm::length(held.position - x) > reach) return {};
     // A fit may reach beyond what carries it: there must be surface where the point now stands.
-    const float off = most_off * frame.edge;
-    const SurfaceIndex::Hit under = frame.index.closest(held.position, off);
-    if (!(under.distance < off)) return {};
-    for (uint32_t corner : frame.mesh.triangles[under.triangle])
+    const SurfaceIndex::Hit under = frame.index.closest(held.position, 2 * frame.edge);
+    if (!(under.distance < 2 * frame.edge)) return {};
+    const Triangle& t = frame.mesh.triangles[under.triangle];
+    float size = 0;  // coarse facets stand off the smooth surface that they mean
+    for (int k = 0; k < 3; ++k) size += glm::distance(frame.mesh.positions[t[k]], frame.mesh.positions[t[(k + 1) % 3]]) / 3;
+    if (under.distance > most_off * std::max(size, frame.edge)) return {};
+    for (uint32_t corner : t)
         if (glm::dot(frame.mesh.normals[corner], held.normal) > least_agreement) return held;
     return {};
 }

@@ -24,6 +24,13 @@ void check_values(const std::vector<glm::vec3>& values, const char* what, const 
                              std::to_string(values[i].z));
 }
 
+/// From the source's space to that of assets: right-handed, z up, metres.
+glm::mat3 to_asset_space(const ReadOptions& options) {
+    const float scale = options.scale > 0 ? float(options.scale) : 1.f, side = options.handedness == 'l' ? -scale : scale;
+    if (options.up == 'y') return {{scale, 0, 0}, {0, 0, scale}, {0, -side, 0}};
+    return {{scale, 0, 0}, {0, side, 0}, {0, 0, scale}};
+}
+
 /// Which of the source's frames are wanted, as indices.
 std::vector<size_t> select(const SequenceInfo& info, const ReadOptions& options) {
     const std::vector<int>& numbers = info.numbers;
@@ -47,17 +54,26 @@ std::vector<size_t> select(const SequenceInfo& info, const ReadOptions& options)
         step = step == 0 ? gap : std::min(step, gap);
     }
     if (options.step > 1) step = options.step;
-    for (size_t i = 1; i < chosen.size(); ++i)
-        if (int64_t(numbers[chosen[i]]) - numbers[chosen[i - 1]] != step)
-            throw InputError(info.path + ": frame " + std::to_string(numbers[chosen[i - 1]] + step) +
-                             " is missing (frames " + range + " must step evenly; choose a whole part with --frames)");
+    size_t missing = 0;
+    std::string first_missing;
+    for (size_t i = 1; i < chosen.size(); ++i) {
+        const int64_t before = numbers[chosen[i - 1]], gap = numbers[chosen[i]] - before;
+        if (gap % step != 0)
+            throw InputError(info.path + ": frame " + std::to_string(numbers[chosen[i]]) + " does not fit: frames " + range + " step by " +
+                             std::to_string(step) + "; choose an even part with --frames");
+        if (gap != step && missing == 0) first_missing = std::to_string(before + step);
+        missing += size_t(gap / step - 1);
+    }
+    if (missing > 0 && options.warn)
+        options.warn(info.path + ": frame " + first_missing + " is missing" + (missing > 1 ? " and " + std::to_string(missing - 1) + " more" : "") +
+                     ": the liquid is carried across the gap, at its true speed; bake what is missing for a better asset");
     return chosen;
 }
 
 class Frames : public SequenceReader {
 public:
     Frames(std::unique_ptr<SequenceReader> source, const ReadOptions& options)
-        : source_(std::move(source)), info_(source_->info()), warn_(options.warn) {
+        : source_(std::move(source)), info_(source_->info()), warn_(options.warn), space_(to_asset_space(options)) {
         if (info_.numbers.empty()) throw InputError(info_.path + ": no frames");
         chosen_ = select(info_, options);
         if (options.require_velocity && info_.velocity == VelocityMeaning::none)
@@ -76,18 +92,25 @@ public:
     std::vector<std::filesystem::path> files(size_t index) const override { return source_->files(chosen_.at(index)); }
     Mesh read_surface(size_t index) const override {
         Mesh mesh = source_->read_surface(chosen_.at(index));
-        check_frame(mesh, name(index), [this](const std::string& message) { warn_once(message); });
-        return mesh;
+        return checked(std::move(mesh), index);
     }
     Mesh read(size_t index) const override {
         Mesh mesh = source_->read(chosen_.at(index));
         if (info_.velocity != VelocityMeaning::none && mesh.velocities.empty() && !mesh.positions.empty())
             throw InputError(name(index) + ": no velocity, though other frames have it");
-        check_frame(mesh, name(index), [this](const std::string& message) { warn_once(message); });
-        return mesh;
+        return checked(std::move(mesh), index);
     }
 
 private:
+    Mesh checked(Mesh mesh, size_t index) const {
+        if (space_ != glm::mat3(1)) {
+            for (glm::vec3& x : mesh.positions) x = space_ * x;
+            for (glm::vec3& v : mesh.velocities) v = space_ * v;
+            for (glm::vec3& n : mesh.normals) n = glm::normalize(space_ * n);
+        }
+        check_frame(mesh, name(index), [this](const std::string& message) { warn_once(message); });
+        return mesh;
+    }
     /// A sequence usually has the same flaw in every frame, and frames are read several times.
     void warn_once(const std::string& message) const {
         const std::lock_guard lock(mutex_);
@@ -99,6 +122,7 @@ private:
     std::unique_ptr<SequenceReader> source_;
     SequenceInfo info_;
     std::function<void(const std::string&)> warn_;
+    glm::mat3 space_;
     std::vector<size_t> chosen_;
     mutable std::mutex mutex_;
     mutable std::vector<std::string> warned_;

@@ -8,7 +8,9 @@
 
 namespace rill::cooker {
 
-/// Measured, see README.md "Spans": what starting afresh costs.
+/// dam_break (100 frames, --error 0.25e) in spans of 1, 2 and 4 windows of 24: 570, 581 and 596 kB at a p99 of 4.04, 4.09 and
+/// 4.11 mm, so starting afresh costs no bytes. But where a span ends the surface changes by a p99 of .35 to .57 edges, at
+/// other window borders by .31 to .35: so as seldom as leaves a farm enough to share.
 inline constexpr uint32_t windows_per_span = 4;
 
 struct SpanPlan {

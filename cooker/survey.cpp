@@ -102,7 +102,7 @@ json kept_survey(const std::string& file, const std::string& states, const ReadO
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
     if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 1) return nullptr;
-    const bool same = kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
+    const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
 
@@ -136,7 +136,9 @@ json read_settings(const ReadOptions& options) {
     json range = nullptr;
     if (options.step != 0) range = {options.first, options.last, options.step};
     return {{"fps", options.frames_per_second}, {"frames", range}, {"velocity", options.velocity_name},
-            {"velocity_unit", options.velocity_per_frame ? "frame" : "second"}};
+            {"velocity_unit", options.velocity_per_frame ? "frame" : "second"},
+            {"up", options.up == 'y' ? "y" : "z"}, {"handedness", options.handedness == 'l' ? "left" : "right"},
+            {"scale", options.scale > 0 ? options.scale : 1}};
 }
 
 std::string known_input(const SequenceReader& reader, const ReadOptions& options, const std::string& file, int jobs) {
@@ -159,7 +161,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 1}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 1}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

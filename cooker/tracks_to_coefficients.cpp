@@ -351,6 +351,14 @@ QuantisedTrack quantise_track(const TrackSamples& track, const Quantiser& quanti
     return std::move(best.track);
 }
 
+float rough_bits(const QuantisedTrack& track) {
+    constexpr double birth = 40;  // place, axis, life
+    double bits = birth;
+    for (size_t i = 3; i < track.position.size(); ++i) bits += cost_of(track.position[i]);
+    for (size_t i = track.drop ? 6 : 3; i < track.second.size(); ++i) bits += cost_of(track.second[i]);
+    return float(bits);
+}
+
 TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quantiser,
                               const glm::vec3& origin, const format::BasisTables& tables) {
     const format::LatticeSteps steps = lattice_steps(quantiser, origin);

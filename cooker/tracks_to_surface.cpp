@@ -146,6 +146,28 @@ Surplus measure_surplus(const std::vector<SurfacePoint>& points, int jobs) {
     return result;
 }
 
+Surplus measure_places(const std::vector<SurfacePoint>& points, const std::vector<SurfacePoint>& places) {
+    Surplus result;
+    result.distance.assign(places.size(), missing);
+    result.angle.assign(places.size(), 3.14159f);
+    if (points.empty()) return result;
+    const PointField decoded(points, 1);
+    const surface::Field& field = decoded.field;
+    std::vector<uint32_t> candidates(field.point_count);
+    for (size_t i = 0; i < places.size(); ++i) {
+        const glm::vec3 &p = places[i].position, &n = places[i].normal;
+        const surface::Box box{{p.x, p.y, p.z}, {p.x, p.y, p.z}};
+        const uint32_t found = surface::gather(field, box, candidates.data(), uint32_t(candidates.size()));
+        float value, gx, gy, gz;
+        surface::evaluate_gradient(field, candidates.data(), found, &p.x, &p.y, &p.z, 1, &value, &gx, &gy, &gz, nullptr);
+        const float slope = std::sqrt(gx * gx + gy * gy + gz * gz);
+        if (value >= surface::unsupported || !(slope > 0)) continue;
+        result.distance[i] = std::fabs(value) / std::max(slope, 0.3f);
+        result.angle[i] = std::acos(std::clamp((gx * n.x + gy * n.y + gz * n.z) / slope, -1.f, 1.f));
+    }
+    return result;
+}
+
 double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction) {
     std::vector<std::pair<float, float>> weighted;
     double total = 0, sum = 0;

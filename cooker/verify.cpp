@@ -15,7 +15,7 @@ namespace {
 
 FrameMeasure measure(const Mesh& source, const Mesh& decoded) {
     FrameMeasure frame;
-    frame.source_triangles = uint32_t(source.triangles.size());
+    frame.source_triangles = uint32_t(source.triangles.size()), frame.source_vertices = uint32_t(source.positions.size());
     frame.decoded_triangles = uint32_t(decoded.triangles.size());
     frame.edge = median_edge(source);
     frame.distance = surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded));
@@ -61,6 +61,15 @@ std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const s
         read.last = directory.frame_number(directory.header.frame_count - 1);
     }
     read.step = std::max(read.step, directory.header.frame_step);
+    const nlohmann::json stored = nlohmann::json::parse(directory.settings_json, nullptr, false);
+    const auto setting = [&](const char* name) {
+        const nlohmann::json::json_pointer place(std::string("/settings/read/") + name);
+        return stored.is_object() && stored.contains(place) ? stored.at(place) : nlohmann::json();
+    };
+    if (read.up == 0) read.up = setting("up") == "y" ? 'y' : 'z';
+    if (read.handedness == 0) read.handedness = setting("handedness") == "left" ? 'l' : 'r';
+    if (const nlohmann::json scale = setting("scale"); read.scale == 0 && scale.is_number()) read.scale = scale;
+    if (const nlohmann::json fps = setting("fps"); read.frames_per_second == 0 && fps.is_number()) read.frames_per_second = fps;
     return open_sequence(input, read);
 }
 

@@ -15,7 +15,7 @@ namespace rill::cooker {
 struct FrameMeasure {
     int number = 0;              ///< the source's
     double seconds = 0;          ///< after the asset's first frame
-    uint32_t source_triangles = 0, decoded_triangles = 0;
+    uint32_t source_triangles = 0, source_vertices = 0, decoded_triangles = 0;
     double edge = 0;             ///< median edge of the source frame, metres
     SurfaceDistance distance;
     Topology source, decoded;
@@ -57,14 +57,15 @@ struct Verification {
     bool target_met() const { return target_p99 == 0 || p99 <= target_p99 * target_slack; }
     static constexpr double target_slack = 1.1;
 };
-/// The frames of `asset` (or of `read`'s range, if it has one) out of `input`. Throws InputError when either
+/// The frames of `asset` (or of `read`'s range, if it has one) out of `input`, read as they were when it was cooked
+/// unless `read` says otherwise. Throws InputError when either
 /// cannot be read or the input lacks one.
 std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read);
 /// Every frame of the source against the asset. Throws InputError when the asset lacks one. jobs 0: all cores.
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
                     const std::function<void(uint32_t done, uint32_t total)>& progress = {});
 
-/// Documented in cooker/README.md.
+/// Documented in cooker/REPORTS.md.
 nlohmann::json to_json(const Verification& verification);
 /// One self-contained page: figures, graphs, and the worst frames beside those of the source.
 std::string to_html(const Verification& verification, const SequenceReader& source);

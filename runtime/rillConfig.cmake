@@ -14,3 +14,4 @@ if(NOT rill_FIND_COMPONENTS OR "host" IN_LIST rill_FIND_COMPONENTS)
   find_dependency(Threads)
 endif()
 include(${CMAKE_CURRENT_LIST_DIR}/rillTargets.cmake)
+include(${CMAKE_CURRENT_LIST_DIR}/RillCookAsset.cmake OPTIONAL)  # there when the rill tool is

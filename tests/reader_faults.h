@@ -7,6 +7,12 @@
 #include "sequence_files.h"
 
 /// Opens and reads every frame; the text of the InputError, or "" when all is well.
+inline std::string warning(const std::string& input, rill::cooker::ReadOptions options = {}) {
+    std::string said;
+    options.warn = [&](const std::string& message) { said += message + "\n"; };
+    rill::cooker::open_sequence(input, options);
+    return said;
+}
 inline std::string fault(const std::string& input, const rill::cooker::ReadOptions& options = {}) {
     using namespace rill::cooker;
     try {

@@ -105,10 +105,36 @@ TEST_CASE("cook: a recipe, over which the command line goes") {
     CHECK(run_rill("cook " + clip().input + " -o " + (folder / "c.rill") + " --quiet --error 0.4e --recipe " + recipe).code == 0);
     CHECK(get_file(folder / "c.rill") == get_file(clip().asset));
     CHECK(run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe).code == 1);
-    put_file(recipe, R"({"eror": "1e"})");
-    CHECK(has(run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe), "eror"));
-    put_file(recipe, "[");
-    CHECK(run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe).code == 2);
+    const auto refused = [&](const std::string& text, int code, const std::string& cause) {
+        put_file(recipe, text);
+        const Result result = run_rill("cook " + clip().input + " -o " + (folder / "d.rill") + " --recipe " + recipe);
+        CAPTURE(result.text);
+        CHECK(result.code == code);
+        CHECK(has(result, "r.json: " + cause));
+        CHECK(std::count(result.text.begin(), result.text.end(), '\n') == 1);
+    };
+    refused(R"({"eror": "1e"})", 1, "'eror' is no setting of a recipe; there are");
+    refused(R"({"depfile": "x"})", 1, "'depfile' is no setting");
+    refused(R"({"error": "1e", "error": "2e"})", 1, "'error' stands there twice");
+    refused(R"({"window": "6"})", 1, "'window' must be a number");
+    refused(R"({"error": 6})", 1, "'error' must be a text");
+    refused(R"({"window": 900})", 1, "--window");
+    refused(R"({"version": 2})", 1, "version 2 is not known");
+    refused(R"({"targets": {"bytes": 3}})", 1, "'bytes' is no target");
+    refused(R"({"targets": {"max_percent": -3}})", 1, "target 'max_percent' must be");
+    refused("[", 2, "not JSON: parse error at line 1, column 2");
+    refused("[]", 2, "not a JSON object");
+
+    // Whole: input and output beside the recipe, and what the asset must keep to.
+    put_file(recipe, R"({"version": 1, "input": "../)" + fs::path(clip().folder.path).filename().string() +
+                         R"(/ball", "output": "own.rill", "error": "0.4e", "window": 3, "targets": {"bytes_per_frame": 1e6}})");
+    CHECK(run_rill("cook --quiet --recipe " + recipe).code == 0);
+    CHECK(get_file(folder / "own.rill") == get_file(clip().asset));
+    put_file(recipe, R"({"input": "/", "output": "own.rill", "error": "0.4e", "window": 3, "targets": {"bytes_per_frame": 1, "normal_degrees": 90}})");
+    const Result missed = run_rill("cook --quiet " + clip().input + " --recipe " + recipe);
+    CHECK(missed.code == 3);
+    CHECK(has(missed, "bytes_per_frame"));
+    CHECK(!has(missed, "normal_degrees"));
 }
 
 TEST_CASE("cook: bad input is 2, one line, and no asset") {
@@ -125,8 +151,10 @@ TEST_CASE("cook: bad input is 2, one line, and no asset") {
     check("no such file");
     fs::create_directories(input);
     check("empty");
+    for (int number : {1, 3, 6}) put_file(input + "/f" + std::to_string(number) + ".ply", plain_ply(Clip::frame(number)));
+    check("frame 6 does not fit");
+    fs::remove_all(input);
     for (int number : {1, 2, 4}) put_file(input + "/f" + std::to_string(number) + ".ply", plain_ply(Clip::frame(number)));
-    check("frame 3 is missing");
     Mesh bad = Clip::frame(3);
     bad.positions[7].x = std::nanf("");
     put_file(input + "/f3.ply", plain_ply(bad));
@@ -292,6 +320,33 @@ TEST_CASE("export: meshes that lie on the source, with normals and velocity") {
     CHECK(fs::file_size(folder / "coarse.obj") < fs::file_size(folder / "mid.glb"));
 
     CHECK(run_rill("export " + clip().asset + " -o " + (folder / "all.ply")).code == 1);
+    CHECK(run_rill("export " + clip().asset + " --cell 0.1 -o " + (folder / "all.glb")).code == 0);
+    const std::string glb = get_file(folder / "all.glb");
+    uint32_t json_bytes;
+    std::memcpy(&json_bytes, glb.data() + 12, 4);
+    const nlohmann::json scene = nlohmann::json::parse(glb.substr(20, json_bytes));
+    CHECK(scene["meshes"].size() == 6);
+    CHECK(scene["nodes"].size() == 7);
+    REQUIRE(scene["animations"][0]["channels"].size() == 6);
+    for (const char* attribute : {"POSITION", "NORMAL", "_VELOCITY"}) CHECK(scene["meshes"][3]["primitives"][0]["attributes"].contains(attribute));
+    // At every frame exactly its own mesh has a size.
+    const auto floats = [&](const nlohmann::json& accessor) {
+        const nlohmann::json& view = scene["bufferViews"][accessor["bufferView"].get<size_t>()];
+        std::vector<float> values(view["byteLength"].get<size_t>() / 4);
+        std::memcpy(values.data(), glb.data() + 28 + json_bytes + view["byteOffset"].get<size_t>(), values.size() * 4);
+        return values;
+    };
+    for (int frame = 0; frame < 6; ++frame)
+        for (int node = 0; node < 6; ++node) {
+            const nlohmann::json& sampler = scene["animations"][0]["samplers"][size_t(node)];
+            CHECK(sampler["interpolation"] == "STEP");
+            const std::vector<float> times = floats(scene["accessors"][sampler["input"].get<size_t>()]);
+            const std::vector<float> scales = floats(scene["accessors"][sampler["output"].get<size_t>()]);
+            REQUIRE(scales.size() == 3 * times.size());
+            size_t key = 0;
+            while (key + 1 < times.size() && times[key + 1] <= (float(frame) + 0.5f) / 24) ++key;
+            CHECK(scales[3 * key] == (frame == node ? 1 : 0));
+        }
     CHECK(run_rill("export " + clip().asset + " -o " + (folder / "a%d.stl")).code == 1);
     CHECK(run_rill("export " + clip().asset + " -o " + (folder / "b.ply") + " --time 99").code == 1);
     CHECK(run_rill("export " + clip().asset + " -o " + (folder / "c%d.ply") + " --frames 1:4").code == 2);
@@ -318,12 +373,59 @@ TEST_CASE("compare: Draco's size falls and its error grows with fewer bits") {
     CAPTURE(result.text);
     REQUIRE(result.code == 0);
     const nlohmann::json json = json_of(folder / "c.json");
-    REQUIRE(json["rivals"].size() == 2);
+    REQUIRE(json["rivals"].size() == 3);
+    for (const nlohmann::json& rival : json["rivals"])
+        for (const nlohmann::json& point : rival["points"]) {
+            CHECK(point["bytes_with_velocity_per_frame"].get<double>() > point["bytes_per_frame"].get<double>());
+            CHECK(point["decode_ms"].get<double>() > 0);
+        }
     const nlohmann::json& points = json["rivals"][0]["points"];
-    REQUIRE(points.size() == 5);
+    REQUIRE(points.size() == 7);
     for (size_t i = 1; i < points.size(); ++i) {
         CHECK(points[i]["bytes_per_frame"].get<double>() > points[i - 1]["bytes_per_frame"].get<double>());
         CHECK(points[i]["mean_m"].get<double>() < points[i - 1]["mean_m"].get<double>());
     }
     CHECK(json["rill"]["bytes_per_frame"].get<double>() > 0);
+    const Result missing = run_rill("compare " + clip().input + " --asset " + clip().asset + " --frames 3:3 --decimator /nonexistent/tool");
+    CHECK(missing.code == 2);
+    CHECK(missing.text.find("/nonexistent/tool: ") != std::string::npos);
+}
+
+TEST_CASE("cook: dry run, up to date, depfile, segments and link") {
+    const TestFolder folder;
+    const std::string asset = folder / "a b.rill", common = "cook " + clip().input + " --error 0.4e --window 3 ";
+    Result result = run_rill(common + "--dry-run -o '" + asset + "'");
+    CAPTURE(result.text);
+    CHECK(result.code == 0);
+    for (const char* part : {"PLY sequence, 6 frames from 3 to 8", "carries on to the next frame, times 1", "spans     1 of 12 frames", "would be cooked"})
+        CHECK(has(result, part));
+    CHECK(fs::is_empty(folder.path));
+    CHECK(run_rill(common + "--quiet -o '" + asset + "' --depfile " + (folder / "d")).code == 0);
+    const std::string rule = get_file(folder / "d");
+    CHECK(rule.find("a\\ b.rill: \\\n  " + clip().input + "/frame_0003.ply \\\n") != std::string::npos);
+    CHECK(rule.find("frame_0008.ply") != std::string::npos);
+    CHECK(rule.find("  " + clip().input + "\n") != std::string::npos);
+    CHECK(has(run_rill(common + "--dry-run -o '" + asset + "'"), "up to date"));
+    result = run_rill(common + "-o '" + asset + "'");
+    CHECK(result.code == 0);
+    CHECK(has(result, "up to date"));
+    CHECK(!has(run_rill(common + "--force -o '" + asset + "'"), "up to date"));
+
+    // A single span: the first segment has nothing to do.
+    const std::string fine = "cook " + clip().input + " --error 0.4e --window 1 --quiet ";
+    const int code = run_rill(fine + "-o " + (folder / "whole.rill")).code;
+    CHECK((code == 0 || code == 3));  // windows this short may miss; then linking tells it
+    for (const char* segment : {"1", "2"})
+        CHECK(run_rill(fine + "--segment " + segment + "/2 --survey " + (folder / "survey") + " -o " + (folder / (std::string("p") + segment))).code == 0);
+    const std::string parts = (folder / "p2") + " " + (folder / "p1");
+    CHECK(run_rill("link " + parts + " --quiet -o " + (folder / "linked.rill") + " --report " + (folder / "r.json")).code == code);
+    CHECK(get_file(folder / "linked.rill") == get_file(folder / "whole.rill"));
+    CHECK(json_of(folder / "r.json")["measured"]["frames"] == 6);
+    result = run_rill("link " + (folder / "p1") + " -o " + (folder / "x.rill"));
+    CHECK(result.code == 2);
+    CHECK(has(result, "nothing to link"));
+    for (const char* bad : {"0/2", "3/2", "1", "1/2x", "a/b", "1/-2"}) {
+        CAPTURE(bad);
+        CHECK(run_rill(fine + "-o " + (folder / "x") + " --segment " + bad).code == 1);
+    }
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 
+#include "asset_directory.h"
 #include "asset_player.h"
 #include "cook.h"
 #include "sequence_files.h"
@@ -144,24 +145,32 @@ TEST_CASE("the same input gives the same bytes at 1, 2 and 8 jobs") {
     }
 }
 
-TEST_CASE("layers: the first is closed, and each brings the surface nearer") {
+TEST_CASE("layers: closed from the first on, nearer with each, and cheap first") {
     AssetPlayer player(whole().asset);
     REQUIRE(player.info().layers == 3);
-    for (uint32_t i : {1u, 5u}) {
+    double mean[3] = {};
+    for (uint32_t i = 0; i < frames; ++i) {
         CAPTURE(i);
         const Mesh source = of_frame(int(i));
-        double before = 1e30;
         for (uint32_t layers = 1; layers <= 3; ++layers) {
             CAPTURE(layers);
             const Mesh decoded = player.mesh(i / fps, 0, layers);
             const Topology shape = topology(decoded);
             CHECK(shape.open_edges == 0);
             CHECK(shape.non_manifold_edges == 0);
-            const double mean = distance(source, decoded).mean;
-            CHECK(mean < before);
-            before = mean;
+            const double error = distance(source, decoded).mean;
+            mean[layers - 1] += error / frames;
         }
     }
+    CHECK(mean[1] < 0.5 * mean[0]);
+    CHECK(mean[2] < 0.5 * mean[1]);
+    const AssetDirectory directory = read_directory(whole().asset);
+    uint64_t first = 0, all = 0;
+    for (const auto& chunk : directory.chunks) {
+        if (chunk.layer == 0) first += chunk.bytes;
+        all += chunk.bytes;
+    }
+    CHECK(first < all / 4);  // an eighth, but for what a chunk of thirty tracks costs before its first
 }
 
 TEST_CASE("at a window's border nothing pops: either side is within the coding error of the same frame") {
@@ -195,7 +204,7 @@ TEST_CASE("velocity: that of the liquid, and of the surface itself") {
         const Mesh later = player.mesh(t + step);
         const double stayed = distance(mesh, later).mean, went = distance(moved, later).mean;
         INFO("moved ", went, ", unmoved ", stayed);
-        CHECK(went < 0.3 * stayed);
+        CHECK(went < 0.4 * stayed);  // not 0: points that fade in and out move it too
     }
 }
 

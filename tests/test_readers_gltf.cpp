@@ -48,7 +48,7 @@ struct File {
         return primitive;
     }
     json compressed(const Mesh& mesh) {
-        const std::string bytes = draco_encode(mesh, 14);
+        const std::string bytes = draco_encode(mesh, 14, 14);
         json primitive = {{"attributes",
                            {{"POSITION", accessor(-1, 5126, "VEC3", mesh.positions.size())},
                             {"_VELOCITY", accessor(-1, 5126, "VEC3", mesh.positions.size())}}},

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int frames = 13;  // in windows of 2, spans of 4: three spans
+constexpr int frames = 13;  // in windows of 1, spans of 4: three spans
 
 Mesh of_frame(int i) {
     Mesh mesh = bumpy_sphere(24, 0.5f, {0.03f * float(i), 0.02f * float(i % 5), 0.5f});
@@ -31,7 +31,7 @@ struct Clip {
     CookSettings settings;
     Clip() {
         for (int i = 0; i < frames; ++i) put_file(input + "/f" + std::to_string(i + 1) + ".ply", plain_ply(of_frame(i)));
-        settings.error = "0.4e", settings.window = 2, settings.jobs = 2, settings.layers = 2;
+        settings.error = "0.4e", settings.window = 1, settings.jobs = 2, settings.layers = 2;
     }
     CookReport cook(const std::string& output, const std::function<void(const CookProgress&)>& progress = [](const CookProgress&) {}) const {
         return rill::cooker::cook(input, output, settings, progress);
@@ -93,7 +93,7 @@ TEST_CASE("spans cover every frame, share their borders, and none is tiny") {
 
 TEST_CASE("segments, linked in any order, are the asset that one machine makes") {
     Clip clip;
-    REQUIRE(SpanPlan{frames, 2}.spans() == 3);
+    REQUIRE(SpanPlan{frames, 1}.spans() == 3);
     for (uint32_t count : {1u, 2u, 3u, 5u}) {
         CAPTURE(count);
         std::vector<std::string> parts = clip.segments(count);
@@ -170,7 +170,13 @@ TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are
     const auto stop_at = [&](uint32_t frame) {
         CHECK_THROWS_AS(clip.cook(clip.asset, [&](const CookProgress& p) { if (p.stage == "cooking" && p.frames_done >= frame) throw Stop(); }), Stop);
     };
+    std::string said;
+    clip.settings.read.warn = [&](const std::string& message) { said += message; };
+    stop_at(1);  // within the first: nothing to keep
+    CHECK(clip.files() == 1);
+    CHECK(!has(said, "keeps the finished spans"));
     stop_at(9);  // within the third span
+    CHECK(has(said, "keeps the finished spans"));
     REQUIRE(clip.files() == 2);
     fs::path kept;
     for (const auto& entry : fs::directory_iterator(clip.folder.path))
@@ -193,7 +199,7 @@ TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are
     CHECK(finished == expected);
     uint32_t calls = 0;
     clip.cook(clip.asset, [&](const CookProgress& p) { calls += p.stage == "cooking" ? 1 : 0; });
-    CHECK(calls == 9 - 2 * finished);  // a span's end, and its two windows where it is cooked
+    CHECK(calls == 3 * (windows_per_span + 1) - windows_per_span * finished);  // a span's end, and its windows where it is cooked
     CHECK(get_file(clip.asset) == whole());
     CHECK(clip.files() == 2);  // input and asset: what was kept is gone
 }
@@ -252,10 +258,45 @@ TEST_CASE("at a span's border nothing pops more than at a window's") {
     Clip clip;
     const CookReport report = clip.cook(clip.asset);
     AssetPlayer player(clip.asset);
-    for (int border : {2, 4, 6, 8, 10}) {
+    for (int border : {2, 4, 6, 8, 10}) {  // 4 and 8 are spans'
         CAPTURE(border);
         const double t = border / 24.0, nearly = 1e-6;
         const Mesh before = player.mesh(t - nearly), after = player.mesh(t + nearly);
         CHECK(surface_distance(before, SurfaceIndex(before), after, SurfaceIndex(after)).p99 < 2 * report.target_p99);
     }
+}
+
+TEST_CASE("a gap in the frames: true times, the source's numbers") {
+    Clip clip;
+    for (int gone : {4, 5, 11}) fs::remove(clip.input + "/f" + std::to_string(gone) + ".ply");
+    const CookReport report = clip.cook(clip.asset);
+    CHECK(report.target_met);
+    const AssetDirectory directory = read_directory(clip.asset);
+    REQUIRE(directory.header.frame_count == 10);
+    CHECK(directory.numbers == std::vector<int>{1, 2, 3, 6, 7, 8, 9, 10, 12, 13});
+    CHECK(directory.index_of(6) == 3);
+    CHECK(has(message_of([&] { directory.index_of(5); }), "no frame 5"));
+    AssetPlayer player(clip.asset);
+    CHECK(player.frame_seconds(3) == doctest::Approx(5 / 24.0));
+    link_asset(clip.segments(2), clip.folder / "linked.rill");
+    CHECK(get_file(clip.folder / "linked.rill") == get_file(clip.asset));
+    // Verified frame by frame against the same input.
+    const auto source = open_source_of(clip.asset, clip.input, {});
+    CHECK(verify(clip.asset, *source, 2).p99 < 1.2 * report.target_p99);
+}
+
+TEST_CASE("the asset remembers how its source was to be read") {
+    Clip clip;
+    clip.settings.read.up = 'y', clip.settings.read.handedness = 'l', clip.settings.read.scale = 0.5, clip.settings.read.frames_per_second = 48;
+    for (int i = 4; i <= frames; ++i) fs::remove(clip.input + "/f" + std::to_string(i) + ".ply");
+    const CookReport report = clip.cook(clip.asset);
+    CHECK(report.json["settings"]["read"]["scale"] == 0.5);
+    const auto source = open_source_of(clip.asset, clip.input, {});
+    CHECK(source->info().frames_per_second == 48);
+    const Verification result = verify(clip.asset, *source, 2);
+    CHECK(result.p99 < 1.2 * report.target_p99);
+    CHECK(read_directory(clip.asset).header.upper[1] > 0.4);  // the source's z, which reaches higher than its y
+    ReadOptions other;
+    other.scale = 1;
+    CHECK(verify(clip.asset, *open_source_of(clip.asset, clip.input, other), 2).p99 > 2 * report.target_p99);
 }

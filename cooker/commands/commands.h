@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -31,7 +32,7 @@ FrameRange parse_frames(const std::string& text);
 
 /// How a sequence is to be read, shared by the commands that read one.
 struct InputOptions {
-    std::string path, velocity_unit = "second";
+    std::string path, velocity_unit = "second", up, handedness;
     ReadOptions read;
     CLI::Option* add_to(CLI::App& command);  ///< returns INPUT, required
     ReadOptions checked() const;  ///< with warnings to stderr. Throws UsageError
@@ -55,9 +56,11 @@ private:
 
 /// Size and error of a finished asset, and the exit code that follows.
 int tell_target(const std::string& asset, double target_p99, double measured_p99, bool met, bool quiet);
-/// A recipe holds the long options of `rill cook` by name; what stands on the command line goes before it. Paths are
-/// relative to the recipe. See RECIPES.md. Throws InputError, UsageError.
-void apply_recipe(const std::string& path, CLI::App& command);
+/// A recipe (RECIPES.md) holds the settings of one `rill cook`; what stands on the command line goes before it. Paths are
+/// relative to the recipe. Returns its further targets. Throws InputError, UsageError.
+std::map<std::string, double> apply_recipe(const std::string& path, CLI::App& command);
+/// The finished asset against those targets: each that is missed is told; the exit code.
+int judge_targets(const std::map<std::string, double>& targets, const std::string& asset, const nlohmann::json& report);
 
 /// Written with two spaces of indent and sorted keys; "-" is standard output.
 void write_json(const std::string& path, const nlohmann::json& json);

@@ -46,12 +46,16 @@ CLI::Option* InputOptions::add_to(CLI::App& command) {
     command.add_option("--fps", read.frames_per_second, "Frames per second, over what the source says")->check(CLI::PositiveNumber);
     command.add_option("--velocity", read.velocity_name, "Name of the velocity attribute");
     command.add_option("--velocity-unit", velocity_unit, "Metres per: second, frame")->check(CLI::IsMember({"second", "frame"}));
+    command.add_option("--up", up, "Axis of the input that points up: z, y")->check(CLI::IsMember({"y", "z"}));
+    command.add_option("--handedness", handedness, "Of the input: right, left")->check(CLI::IsMember({"left", "right"}));
+    command.add_option("--scale", read.scale, "Metres per unit of the input")->check(CLI::PositiveNumber);
     return input;
 }
 
 ReadOptions InputOptions::checked() const {
     ReadOptions options = read;
     options.velocity_per_frame = velocity_unit == "frame";
+    options.up = up.empty() ? 0 : up[0], options.handedness = handedness.empty() ? 0 : handedness[0];
     options.warn = [](const std::string& message) { std::fprintf(stderr, "rill: warning: %s\n", message.c_str()); };
     return options;
 }

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cstdio>
-#include <optional>
+#include <stdlib.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+
+#include "asset_player.h"
 #include "commands/commands.h"
+#include "cook.h"
 #include "rivals.h"
 #include "verify.h"
 
@@ -12,7 +17,7 @@ namespace {
 
 struct CompareOptions {
     InputOptions input;
-    std::string asset, frames, json;
+    std::string asset, frames, json, decimator, error = "0.25e";
     int jobs = 0;
     bool quiet = false;
 };
@@ -22,14 +27,23 @@ struct Measure {
     double RatePoint::*rival;
     double Verification::*own;
 };
-const Measure measures[] = {{"mean_m", "equal mean", &RatePoint::mean, &Verification::mean},
-                            {"p99_m", "equal p99", &RatePoint::p99, &Verification::p99},
-                            {"normal_degrees", "equal normals", &RatePoint::normal_degrees, &Verification::normal_degrees}};
+const Measure measures[] = {{"mean_m", "mean", &RatePoint::mean, &Verification::mean},
+                            {"p99_m", "p99", &RatePoint::p99, &Verification::p99},
+                            {"normal_degrees", "normals", &RatePoint::normal_degrees, &Verification::normal_degrees}};
 
-nlohmann::json to_json(const RatePoint& p) {
+/// What Rill makes of the same frames.
+struct Own {
+    Verification error;
+    double decode_ms = 0;      ///< a frame, one core: reading, decoding, field and mesh, played in order
+    double raw_bytes = 0;      ///< a frame of the source: 12 bytes a vertex and a triangle
+};
+
+nlohmann::json to_json(const RatePoint& p, double raw_bytes) {
     return {{"setting", p.setting},   {"bytes_per_frame", p.bytes_per_frame}, {"triangles_per_frame", p.triangles_per_frame},
             {"mean_m", p.mean},       {"p99_m", p.p99},                       {"max_m", p.max},
-            {"encode_ms", p.encode_ms}, {"decode_ms", p.decode_ms},           {"normal_degrees", p.normal_degrees}};
+            {"encode_ms", p.encode_ms}, {"decode_ms", p.decode_ms},           {"normal_degrees", p.normal_degrees},
+            {"bytes_with_velocity_per_frame", p.bytes_with_velocity},
+            {"raw_over_bytes", p.bytes_per_frame > 0 ? raw_bytes / p.bytes_per_frame : 0}};
 }
 
 /// A sequence is sampled so that a look at it takes a minute; --frames asks for more.
@@ -43,21 +57,94 @@ ReadOptions spread(ReadOptions options, const std::string& path) {
     return options;
 }
 
-void print(const std::vector<RateCurve>& curves, const Verification* own, double scale) {
-    std::printf("%-28s %-34s %12s %9s %9s %8s %9s\n", "method", "setting", "bytes/frame", "mean %", "p99 %", "normals", "decode ms");
+double decode_time(const Verification& own) {
+    using clock = std::chrono::steady_clock;
+    AssetPlayer player(own.asset, 1);
+    double total = 0;
+    for (const FrameMeasure& frame : own.frames) {
+        const auto start = clock::now();
+        player.mesh(frame.seconds);
+        total += std::chrono::duration<double, std::milli>(clock::now() - start).count();
+    }
+    return own.frames.empty() ? 0 : total / double(own.frames.size());
+}
+
+double raw_bytes_of(const Verification& own) {
+    double sum = 0;
+    for (const FrameMeasure& frame : own.frames) sum += 12.0 * (frame.source_vertices + frame.source_triangles);
+    return own.frames.empty() ? 0 : sum / double(own.frames.size());
+}
+
+void print(const std::vector<RateCurve>& curves, const Own& own) {
+    const double scale = own.error.diagonal > 0 ? 100 / own.error.diagonal : 0;
+    std::printf("%-41s %-18s %11s %11s %8s %8s %8s %9s %8s\n", "method", "setting", "bytes/frame", "+ velocity", "raw : 1", "mean %", "p99 %",
+                "normals", "decode");
+    const auto line = [&](const std::string& method, const std::string& setting, double bytes, double with_velocity, double mean, double p99,
+                          double degrees, double ms) {
+        std::printf("%-41s %-18s %11.0f %11.0f %8.1f %8.4f %8.4f %8.2f° %6.1fms\n", method.c_str(), setting.c_str(), bytes, with_velocity,
+                    bytes > 0 ? own.raw_bytes / bytes : 0, mean * scale, p99 * scale, degrees, ms);
+    };
     for (const RateCurve& curve : curves)
         for (const RatePoint& p : curve.points)
-            std::printf("%-28s %-34s %12.0f %9.4f %9.4f %7.2f° %9.2f\n", curve.method.c_str(), p.setting.c_str(), p.bytes_per_frame,
-                        p.mean * scale, p.p99 * scale, p.normal_degrees, p.decode_ms);
-    if (!own) return;
-    std::printf("%-28s %-34s %12.0f %9.4f %9.4f %7.2f°\n", "Rill", own->target.c_str(), own->bytes_per_frame, own->mean * scale,
-                own->p99 * scale, own->normal_degrees);
-    for (const RateCurve& curve : curves)
-        for (const Measure& m : measures) {
-            const double bytes = curve.bytes_at(m.rival, own->*m.own);
-            if (bytes > 0) std::printf("%s at %s: %.2f times Rill's bytes\n", curve.method.c_str(), m.words, bytes / own->bytes_per_frame);
-            else std::printf("%s: no setting brackets %s\n", curve.method.c_str(), m.words);
+            line(curve.method, p.setting, p.bytes_per_frame, p.bytes_with_velocity, p.mean, p.p99, p.normal_degrees, p.decode_ms);
+    const double bytes = own.error.bytes_per_frame;
+    line("Rill", own.error.target, bytes, bytes, own.error.mean, own.error.p99, own.error.normal_degrees, own.decode_ms);
+    std::printf("\n%-41s %27s   %27s\n%-41s %8s %8s %9s   %8s %8s %9s\n", "bytes over Rill's at equal …", "positions", "with velocity", "",
+                "mean", "p99", "normals", "mean", "p99", "normals");
+    for (const RateCurve& curve : curves) {
+        std::printf("%-41s", curve.method.c_str());
+        for (double RatePoint::*size : {&RatePoint::bytes_per_frame, &RatePoint::bytes_with_velocity}) {
+            for (const Measure& m : measures) {
+                const double rival = curve.bytes_at(size, m.rival, own.error.*m.own);
+                if (rival > 0) std::printf(" %8.2f", rival / bytes);
+                else std::printf(" %8s", "-");
+            }
+            std::printf("    ");
         }
+        std::printf("\n");
+    }
+}
+
+nlohmann::json report_json(const std::vector<RateCurve>& curves, const Own& own, const SequenceReader& source) {
+    const Verification& e = own.error;
+    nlohmann::json json = {{"report", "rill compare"}, {"version", 2}, {"input", e.input}, {"frames", source.info().numbers},
+                           {"raw_bytes_per_frame", own.raw_bytes}, {"rivals", nlohmann::json::array()}};
+    for (const RateCurve& curve : curves) {
+        nlohmann::json points = nlohmann::json::array(), still, moving;
+        for (const RatePoint& p : curve.points) points.push_back(to_json(p, own.raw_bytes));
+        for (const Measure& m : measures) {
+            const auto ratio = [&](double RatePoint::*bytes) {
+                const double rival = curve.bytes_at(bytes, m.rival, e.*m.own);
+                return rival > 0 ? nlohmann::json(rival / e.bytes_per_frame) : nlohmann::json();
+            };
+            still[m.key] = ratio(&RatePoint::bytes_per_frame), moving[m.key] = ratio(&RatePoint::bytes_with_velocity);
+        }
+        json["rivals"].push_back({{"method", curve.method}, {"points", points}, {"bytes_over_rill_at_equal", still},
+                                  {"bytes_over_rill_at_equal_with_velocity", moving}});
+    }
+    json["rill"] = {{"asset", e.asset}, {"bytes_per_frame", e.bytes_per_frame}, {"mean_m", e.mean}, {"p99_m", e.p99}, {"max_m", e.max},
+                    {"normal_degrees", e.normal_degrees}, {"diagonal_m", e.diagonal}, {"decode_ms", own.decode_ms},
+                    {"raw_over_bytes", e.bytes_per_frame > 0 ? own.raw_bytes / e.bytes_per_frame : 0}};
+    return json;
+}
+
+/// Where the asset is cooked that --asset did not name.
+struct OwnFolder {
+    std::string path;
+    ~OwnFolder() {
+        std::error_code ignored;
+        if (!path.empty()) std::filesystem::remove_all(path, ignored);
+    }
+};
+std::string cook_one(const CompareOptions& options, OwnFolder& folder) {
+    std::string name = (std::filesystem::temp_directory_path() / "rill-compare-XXXXXX").string();
+    if (!mkdtemp(name.data())) throw InputError(name + ": cannot be made");
+    folder.path = name;
+    CookSettings settings;
+    settings.error = options.error, settings.jobs = options.jobs, settings.read = options.input.checked();
+    Progress progress("cook", options.quiet);
+    cook(options.input.path, name + "/cooked.rill", settings, [&](const CookProgress& p) { progress(p.stage, p.frames_done, p.frames_total); });
+    return name + "/cooked.rill";
 }
 
 int compare_command(const CompareOptions& options) {
@@ -65,49 +152,24 @@ int compare_command(const CompareOptions& options) {
     ReadOptions read = options.input.checked();
     read.first = range.first, read.last = range.last, read.step = range.step;
     const auto source = open_sequence(options.input.path, spread(read, options.input.path));
+    OwnFolder folder;
+    const std::string asset = options.asset.empty() ? cook_one(options, folder) : options.asset;
     std::vector<size_t> frames(source->info().numbers.size());
     for (size_t i = 0; i < frames.size(); ++i) frames[i] = i;
-
-    std::optional<Verification> own;
-    if (!options.asset.empty()) {
+    Own own;
+    {
         Progress progress("Rill", options.quiet);
-        own = verify(options.asset, *source, options.jobs, [&](uint32_t done, uint32_t total) { progress("", done, total); });
+        own.error = verify(asset, *source, options.jobs, [&](uint32_t done, uint32_t total) { progress("", done, total); });
     }
-    Progress progress("Draco", options.quiet);
-    const std::vector<RateCurve> curves =
-        measure_rivals(*source, frames, options.jobs, [&](uint32_t done, uint32_t total) { progress("", done, total); });
-
-    nlohmann::json json = {{"report", "rill compare"}, {"version", 1}, {"input", options.input.path},
-                           {"frames", source->info().numbers}, {"velocity", false}, {"rivals", nlohmann::json::array()}};
-    for (const RateCurve& curve : curves) {
-        nlohmann::json points = nlohmann::json::array(), ratios;
-        for (const RatePoint& p : curve.points) points.push_back(to_json(p));
-        nlohmann::json entry = {{"method", curve.method}, {"points", points}};
-        for (const Measure& m : measures) {
-            const double bytes = own ? curve.bytes_at(m.rival, *own.*m.own) : 0;
-            ratios[m.key] = bytes > 0 ? nlohmann::json(bytes / own->bytes_per_frame) : nlohmann::json();
-        }
-        if (own) entry["bytes_over_rill_at_equal"] = ratios;
-        json["rivals"].push_back(entry);
+    own.decode_ms = decode_time(own.error), own.raw_bytes = raw_bytes_of(own.error);
+    std::vector<RateCurve> curves;
+    {
+        Progress progress("rivals", options.quiet);
+        curves = measure_rivals(*source, frames, {options.decimator, options.jobs},
+                                [&](uint32_t done, uint32_t total) { progress("", done, total); });
     }
-    if (own)
-        json["rill"] = {{"asset", own->asset}, {"bytes_per_frame", own->bytes_per_frame}, {"mean_m", own->mean}, {"p99_m", own->p99},
-                        {"max_m", own->max}, {"normal_degrees", own->normal_degrees}, {"diagonal_m", own->diagonal}};
-    if (!options.quiet && options.json != "-") {
-        double diagonal = own ? own->diagonal : 0;
-        if (!own) {  // of the first frame with liquid: a scale for the eye only; the JSON is in metres
-            glm::vec3 lower(0), upper(0);
-            for (size_t i = 0; i < frames.size() && lower == upper; ++i) {
-                const Mesh mesh = source->read(i);
-                if (mesh.positions.empty()) continue;
-                lower = upper = mesh.positions[0];
-                for (const glm::vec3& x : mesh.positions) lower = glm::min(lower, x), upper = glm::max(upper, x);
-            }
-            diagonal = glm::distance(lower, upper);
-        }
-        print(curves, own ? &*own : nullptr, diagonal > 0 ? 100 / diagonal : 0);
-    }
-    if (!options.json.empty()) write_json(options.json, json);
+    if (!options.quiet && options.json != "-") print(curves, own);
+    if (!options.json.empty()) write_json(options.json, report_json(curves, own, *source));
     return exit_done;
 }
 
@@ -117,7 +179,9 @@ void add_compare(CLI::App& app, Run& run) {
     auto options = std::make_shared<CompareOptions>();
     CLI::App* command = app.add_subcommand("compare", "Size, error and decoding time against meshes coded frame by frame");
     options->input.add_to(*command);
-    command->add_option("--asset", options->asset, "An asset cooked from this input");
+    command->add_option("--asset", options->asset, "An asset cooked from this input; default: one is cooked for the occasion");
+    command->add_option("--error", options->error, "What is asked of the asset cooked here");
+    command->add_option("--decimator", options->decimator, "Program that simplifies, as another rival: PROGRAM IN.ply KEEP OUT.ply ...");
     command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive; default: about 12, spread evenly");
     command->add_option("--json", options->json, "Write the report as JSON; - is standard output");
     command->add_option("--jobs", options->jobs, "Threads; 0: all cores")->check(CLI::Range(0, 1024));

@@ -63,9 +63,11 @@ int dry_run(const CookOptions& options) {
 }
 
 int cook_command(CookOptions& options, CLI::App& command) {
-    if (!options.recipe.empty()) apply_recipe(options.recipe, command);
+    std::map<std::string, double> targets;
+    if (!options.recipe.empty()) targets = apply_recipe(options.recipe, command);
     if (options.input.path.empty()) throw UsageError("INPUT is required, on the command line or in a recipe");
-    if (options.output.empty()) throw UsageError("--output is required, on the command line or in a recipe");
+    const bool only_survey = options.output.empty() && !options.settings.survey.empty();
+    if (options.output.empty() && !only_survey) throw UsageError("--output is required, on the command line or in a recipe");
     CookSettings& settings = options.settings;
     settings.read = options.input.checked();
     const FrameRange frames = parse_frames(options.frames);
@@ -75,6 +77,10 @@ int cook_command(CookOptions& options, CLI::App& command) {
     CookReport report;
     {
         Progress progress("cook", options.quiet);
+        if (only_survey) {
+            survey(options.input.path, settings, [&](const CookProgress& p) { progress(p.stage, p.frames_done, p.frames_total); });
+            return exit_done;
+        }
         report = cook(options.input.path, options.output, settings, [&](const CookProgress& p) { progress(p.stage, p.frames_done, p.frames_total); });
     }
     if (!options.report.empty()) write_json(options.report, report.json);
@@ -82,10 +88,14 @@ int cook_command(CookOptions& options, CLI::App& command) {
         std::vector<std::string> needed = dependencies(options.input.path, settings);
         if (!options.recipe.empty()) needed.push_back(options.recipe);
         write_file(options.depfile, make_rule(options.output, needed));
+        // A build compares times: what is up to date must not look older than what it depends on.
+        if (report.up_to_date) std::filesystem::last_write_time(options.output, std::filesystem::file_time_type::clock::now());
     }
     if (!options.quiet && report.up_to_date)
         std::printf("%s: up to date: the same input, settings and tool; --force cooks anew\n", options.output.c_str());
-    return report.is_part ? int(exit_done) : tell_target(options.output, report.target_p99, report.measured_p99, report.target_met, options.quiet);
+    if (report.is_part) return exit_done;  // judged when all parts are linked
+    const int code = tell_target(options.output, report.target_p99, report.measured_p99, report.target_met, options.quiet);
+    return std::max(code, judge_targets(targets, options.output, report.json));
 }
 
 }  // namespace
@@ -114,7 +124,7 @@ void add_cook(CLI::App& app, Run& run) {
     command->add_option("--report", options->report, "Write the report as JSON; - is standard output");
     command->add_option("--depfile", options->depfile, "Write what the asset depends on, as a rule for make and ninja");
     command->add_option("--segment", options->segment, "I/N: cook this share only, into a part for rill link");
-    command->add_option("--survey", options->settings.survey, "Keep what all segments must know of the input in this file");
+    command->add_option("--survey", options->settings.survey, "Keep what all segments must know of the input in this file; without -o that is all");
     command->add_flag("--force", options->settings.force, "Cook although the output is up to date");
     command->add_flag("--dry-run", options->dry_run, "Say what would be done");
     command->add_flag("--quiet", options->quiet, "Errors only");

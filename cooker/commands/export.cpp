@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
 #include "asset_directory.h"
 #include "asset_player.h"
 #include "commands/commands.h"
+#include "output_file.h"
 #include "writers/frame_writer.h"
 
 namespace rill::cooker {
@@ -36,6 +38,22 @@ std::vector<uint32_t> chosen_frames(const AssetDirectory& directory, const Expor
     return chosen;
 }
 
+/// All frames in one GLB.
+void export_animation(AssetPlayer& player, const std::vector<uint32_t>& frames, const ExportOptions& options, Progress& progress) {
+    AnimatedGlb glb;
+    try {
+        for (size_t i = 0; i < frames.size(); ++i) {
+            const double seconds = player.frame_seconds(frames[i]);
+            glb.add(player.mesh(seconds, options.cell, options.layers), seconds);
+            progress("", double(i + 1), double(frames.size()));
+        }
+    } catch (const InputError& error) {
+        throw InputError(options.output + ": " + error.what());
+    }
+    const double span = player.frame_seconds(frames.back()) - player.frame_seconds(frames.front());
+    write_file(options.output, glb.bytes(span / double(frames.size() - 1)));
+}
+
 int export_command(const ExportOptions& options) {
     check_frame_extension(options.output);
     if (options.at_time && !options.frames.empty()) throw UsageError("--time and --frames exclude each other");
@@ -49,10 +67,15 @@ int export_command(const ExportOptions& options) {
         return exit_done;
     }
     const std::vector<uint32_t> frames = chosen_frames(directory, options);
-    if (frames.size() > 1 && !has_number_place(options.output))
-        throw UsageError("-o '" + options.output + "' needs a place for the frame number, such as %04d");
+    const bool animated = frames.size() > 1 && !has_number_place(options.output);
+    if (animated && std::filesystem::path(options.output).extension() != ".glb")
+        throw UsageError("-o '" + options.output + "' needs a place for the frame number, such as %04d; only .glb holds many frames in one file");
     number_pattern(options.output, 0);
     Progress progress("export", options.quiet);
+    if (animated) {
+        export_animation(player, frames, options, progress);
+        return exit_done;
+    }
     for (size_t i = 0; i < frames.size(); ++i) {
         const Mesh mesh = player.mesh(player.frame_seconds(frames[i]), options.cell, options.layers);
         write_frame(number_pattern(options.output, directory.frame_number(frames[i])), mesh);
@@ -67,7 +90,7 @@ void add_export(CLI::App& app, Run& run) {
     auto options = std::make_shared<ExportOptions>();
     CLI::App* command = app.add_subcommand("export", "Write meshes back out");
     command->add_option("ASSET", options->asset, "The asset, .rill")->required();
-    command->add_option("-o,--output", options->output, "Where to: pattern with %04d; .ply, .obj or .glb")->required();
+    command->add_option("-o,--output", options->output, "Where to: pattern with %04d, .ply, .obj or .glb; one .glb without %04d is animated")->required();
     command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive");
     CLI::Option* time = command->add_option("--time", options->time, "One mesh, so many seconds after the first frame");
     command->add_option("--cell", options->cell, "Cell size, metres; default: the source's own resolution")->check(CLI::PositiveNumber);

@@ -159,6 +159,9 @@ const std::vector<FrameFormat>& frame_formats() {
         {".glb", "glTF sequence", read_gltf, gltf_buffers},
         {".gltf", "glTF sequence", read_gltf, gltf_buffers},
         {".abc", "Alembic sequence", read_alembic_frame},
+#ifdef RILL_OPENVDB
+        {".vdb", "OpenVDB sequence", read_vdb},
+#endif
     };
     return formats;
 }

@@ -41,6 +41,9 @@ std::unique_ptr<SequenceReader> open_frame_files(const FrameFormat& format, std:
 Mesh read_ply(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_obj(const std::filesystem::path& path, const ReadOptions& options);
 Mesh read_gltf(const std::filesystem::path& path, const ReadOptions& options);
+#ifdef RILL_OPENVDB
+Mesh read_vdb(const std::filesystem::path& path, const ReadOptions& options);
+#endif
 std::vector<std::filesystem::path> gltf_buffers(const std::filesystem::path& path);
 Mesh read_alembic_frame(const std::filesystem::path& path, const ReadOptions& options);  ///< its first sample
 

@@ -32,6 +32,9 @@ struct ReadOptions {
     int first = 0, last = 0, step = 0;  ///< --frames A:B:S; step 0: all frames
     std::string velocity_name;     ///< attribute; empty: names users know (see README); "estimate": from the surfaces
     bool velocity_per_frame = false;
+    char up = 0;                   ///< 'y' or 'z': the source's axis that points up; 0: z. Assets are z up
+    char handedness = 0;           ///< 'l' or 'r'; 0: right. A left-handed source is mirrored in the horizontal axis that is not x
+    double scale = 0;              ///< metres per unit of the source; 0: 1
     bool require_velocity = false; ///< a source without velocity gets an estimate, and `warn` is told
     /// Told in one line what was put right or guessed; may be called from several threads, one at a time.
     std::function<void(const std::string&)> warn;

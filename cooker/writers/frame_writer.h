@@ -2,6 +2,7 @@
 // Frames back out, for other programs.
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "mesh.h"
@@ -22,5 +23,20 @@ bool has_number_place(const std::string& pattern);
 std::string to_ply(const Mesh& mesh);
 std::string to_obj(const Mesh& mesh);
 std::string to_glb(const Mesh& mesh);
+
+/// A sequence in one GLB: a mesh per frame, shown in turn by STEP keys of its node's scale.
+class AnimatedGlb {
+public:
+    AnimatedGlb();
+    ~AnimatedGlb();
+    /// Frames in order of time; a mesh may be empty. Throws InputError when all together exceed what GLB can hold.
+    void add(const Mesh& mesh, double seconds);
+    /// After at least one frame; the last is shown for `last_for` seconds.
+    std::string bytes(double last_for);
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace rill::cooker

@@ -17,7 +17,7 @@ struct ChunkShape {          ///< from the directory, already checked
 /// the caller sized from the shape. Any bytes are safe: anything that does not decode to exactly this
 /// shape is Status::corrupt, and `reason` (static string, may be null) says why.
 /// Deterministic on every machine: prediction and dequantisation of stored symbols are integer work.
-/// Allocates nothing; takes about 60 kB of stack. About 10 µs a track: 2 MB of chunk per second and core.
+/// Allocates nothing; takes about 80 kB of stack. About 5 µs a track: 3 MB of chunk per second and core.
 Status decode_chunk(const uint8_t* bytes, size_t size, const ChunkShape& shape,
                     const uint8_t* model, size_t model_bytes, TrackBlock& block,
                     const char** reason) noexcept;

@@ -38,9 +38,9 @@ enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, 
 
 /// All that adapts while a chunk is coded.
 struct Statistics {
-    static constexpr uint32_t bins = 9;  ///< of a value: zero, sign, unary magnitude class up to 8
-    static constexpr uint32_t contexts[Mixer::inputs] = {12, 49, 40, 48};  ///< per kind
-    static constexpr uint32_t all_contexts = 12 + 49 + 40 + 48;
+    static constexpr uint32_t bins = 8;  ///< of a value: zero, unary magnitude class up to 8
+    static constexpr uint32_t contexts[Mixer::inputs] = {48, 49, 40, 48};  ///< per kind
+    static constexpr uint32_t all_contexts = 48 + 49 + 40 + 48;
     static constexpr uint32_t more_contexts = 72, leaf_contexts = 78;
 
     Counter values[kinds * all_contexts * bins];
@@ -50,9 +50,11 @@ struct Statistics {
     Counter flag[4][12], birth[128], death[128], same_birth[2], same_death[2];
     Counter more[4][Mixer::inputs][more_contexts];
     Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4];
-    /// How far predictions were right: Σ value · prediction / Σ prediction².
+    /// How far predictions were right: Σ value · prediction / Σ prediction², in 1/256; drawn up anew now and then.
     struct Trust {
         int64_t product = 1 << 17, square = 1 << 18;
+        int32_t factor = 128;
+        uint32_t seen = 0;
     } trust[kinds][6];
 };
 
@@ -66,6 +68,7 @@ public:
           steps_(steps),
           samples_(sample_count),
           levels_(axis_levels(steps)),
+          coarse_scale_((1 << 20) / steps.ratio),
           block_(block) {}
 
     /// Codes one of the two sets, tracks [first, first + count) of the block. `source(i)` gives the encoder's
@@ -114,12 +117,12 @@ private:
         };
         const uint32_t wanted = magnitude(value);
         if (!coded(0, wanted != 0)) return 0;
-        const uint32_t negative = coded(1, value < 0);
+        const uint32_t negative = raw(1, value < 0);
         const uint32_t wanted_class = magnitude_class(wanted);
         uint32_t c = 1;
         while (c < 21) {  // 2^20 and below
             const uint32_t more = wanted_class > c;
-            if (!(c + 1 < Statistics::bins ? coded(c + 1, more) : bit(learned_.escape[c], more))) break;
+            if (!(c < Statistics::bins ? coded(c, more) : bit(learned_.escape[c], more))) break;
             ++c;
         }
         uint32_t m = c;
@@ -132,54 +135,35 @@ private:
     }
 
     // ---- neighbours --------------------------------------------------------------------------------
-    static constexpr uint32_t window = 128, nearest = 3;
+    static constexpr uint32_t window = 128, nearest = 3, rest_terms = 12;
     struct Near {
         uint32_t count = 0;
-        uint32_t track[nearest];
-        int64_t distance[nearest];   ///< squared, step/16
-        int64_t mean[nearest][3];    ///< positions, step/16
-        int32_t normal[nearest][3];  ///< of points, in 1/16384
+        uint32_t slot[nearest];
+        uint32_t distance[nearest];  ///< squared, in units of the search
     };
-    void mean_of(uint32_t track, int64_t (&out)[3]) const {
-        const float* at = block_.coefficients + block_.tracks[track].first_coefficient;
-        for (int c = 0; c < 3; ++c) out[c] = load(at + c);
+    /// The last tracks of the set, laid out for searching: slot = number modulo window.
+    struct Recent {
+        uint32_t count = 0;              ///< slots in use
+        int16_t place[3][window];        ///< mean positions, coarse
+        uint32_t life[window];           ///< birth, death, basis
+        int32_t mean[window][3];         ///< step/16
+        int16_t normal[window][3];       ///< of points, 1/16384
+        uint32_t track[window];
+        uint8_t rest[window][2][rest_terms][3];  ///< |residuals|, at most 255, [positions, normals][term][channel]
+    };
+
+    /// Of a neighbour, against the nearest.
+    static int64_t weight_of(const Near& near, uint32_t j) {
+        return 1 + 1024 * (int64_t(near.distance[0]) + 1) / (int64_t(near.distance[j]) + 1);
     }
-    void normal_of(uint32_t track, int32_t (&out)[3]) const {
-        const Track& t = block_.tracks[track];
-        const float* at = block_.coefficients + t.first_coefficient + 3 * t.position_terms;
-        const int32_t axis[2] = {load(at), load(at + 1)};
-        const Frame frame = frame_of(axis, levels_);
-        for (int c = 0; c < 3; ++c) out[c] = frame.row[2][c];
+    static uint32_t life_key(uint32_t birth, uint32_t death, uint32_t flags) {
+        return birth | death << 8 | (flags & track_cosine) << 16;
     }
-    /// The nearest tracks among the last ones of this set; `like`: only those that share its life and basis.
-    Near find_near(uint32_t index, const int64_t (&x)[3], const RawTrack* like) const {
-        Near near;
-        const uint32_t from = index - first_ > window ? index - window : first_;
-        for (uint32_t i = index; i-- > from;) {
-            const Track& t = block_.tracks[i];
-            if (like && (t.birth != like->birth || t.death != like->death ||
-                         ((t.flags ^ like->flags) & track_cosine)))
-                continue;
-            int64_t y[3], d = 0;
-            mean_of(i, y);
-            for (int c = 0; c < 3; ++c) d += (x[c] - y[c]) * (x[c] - y[c]) / 256;
-            if (d > int64_t(1) << 50) d = int64_t(1) << 50;
-            uint32_t at = near.count;
-            if (at == nearest && d >= near.distance[at - 1]) continue;
-            if (at == nearest)
-                --at;
-            else
-                ++near.count;
-            for (; at > 0 && d < near.distance[at - 1]; --at)
-                near.distance[at] = near.distance[at - 1], near.track[at] = near.track[at - 1];
-            near.distance[at] = d, near.track[at] = i;
-        }
-        for (uint32_t j = 0; j < near.count && !like; ++j) {
-            mean_of(near.track[j], near.mean[j]);
-            if (!drops_) normal_of(near.track[j], near.normal[j]);
-        }
-        return near;
-    }
+    void begin_search(const int32_t (&low)[3], const uint8_t (&bits)[3]);
+    void coarse_place(const int64_t (&x)[3], int16_t (&out)[3]) const;
+    void remember(uint32_t index, const RawTrack& t, const Frame& frame);
+    void measure(const int64_t (&x)[3]);
+    Near find_near(bool like, uint32_t life) const;
 
     // ---- parts of a track --------------------------------------------------------------------------
     struct Box {
@@ -189,15 +173,20 @@ private:
     };
     uint32_t split_count(uint32_t n, uint32_t value);
     void leaf(Box& box, const RawTrack* source);
-    uint32_t leaf_bit(const Box& box, uint32_t dimension, const Near& near, uint32_t value);
+    /// The planes of the nearest points, summed up for leaf_bit().
+    struct Planes {
+        uint32_t count = 0, distance = 0;
+        int64_t height = 0, normal[3] = {}, first[3] = {};
+    };
+    uint32_t leaf_bit(const Box& box, uint32_t dimension, const Planes& planes, uint32_t value);
     bool track(uint32_t index, const Box& box, const RawTrack* source);
     bool life(RawTrack& t, const Near& near, const RawTrack* source);
     bool axis(RawTrack& t, const Near& near, const RawTrack* source);
     void along_axis(RawTrack& t, const Frame& frame, const Near& near, const RawTrack* source);
     bool series(RawTrack& t, const Frame& frame, bool second, const Near& near, const Near& like,
                 const RawTrack* source);
-    int64_t turned_value(const RawTrack& t, const Frame& frame, bool second, uint32_t other, uint32_t k,
-                         uint32_t c) const;
+    bool turned_term(const RawTrack& t, const Frame& frame, bool second, uint32_t other, uint32_t k,
+                     int64_t (&out)[3]) const;
     bool term(const RawTrack& t, const Frame& frame, bool second, const Near& like, uint32_t k,
               int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted, int32_t* out);
 
@@ -206,9 +195,15 @@ private:
     const LatticeSteps& steps_;
     uint32_t samples_;
     int32_t levels_;
+    int32_t coarse_scale_;  ///< 16 / ratio, in 1/65536
     TrackBlock& block_;
     uint32_t first_ = 0, done_ = 0, used_ = 0;
     bool drops_ = false;
+    uint8_t rest_[2][rest_terms][3];  ///< of the track at hand
+    Recent recent_;
+    int64_t search_low_[3];
+    uint32_t search_shift_ = 0;
+    uint32_t distance_[window];  ///< of every slot, from measure()
 };
 
 #include "format/chunk_model_parts.h"

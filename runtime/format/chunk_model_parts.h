@@ -25,34 +25,103 @@ uint32_t ChunkModel<Coder>::split_count(uint32_t n, uint32_t value) {
     return 1 + at_most(low + rest, n - 2);
 }
 
+/// Places are searched in units so coarse that differences of any two fit 16 bits.
+template <class Coder>
+void ChunkModel<Coder>::begin_search(const int32_t (&low)[3], const uint8_t (&bits)[3]) {
+    recent_.count = 0, search_shift_ = 0;
+    for (int c = 0; c < 3; ++c) {
+        search_low_[c] = int64_t(low[c]) * steps_.ratio;
+        while ((int64_t(steps_.ratio) << bits[c]) >> search_shift_ > 8192) ++search_shift_;
+    }
+}
+
+template <class Coder>
+void ChunkModel<Coder>::coarse_place(const int64_t (&x)[3], int16_t (&out)[3]) const {
+    for (int c = 0; c < 3; ++c) {
+        const int64_t place = (x[c] - search_low_[c]) >> search_shift_;
+        out[c] = int16_t(place < -8192 ? -8192 : place > 16383 ? 16383 : place);
+    }
+}
+
+template <class Coder>
+void ChunkModel<Coder>::remember(uint32_t index, const RawTrack& t, const Frame& frame) {
+    const uint32_t slot = (index - first_) % window;
+    const float* at = block_.coefficients + block_.tracks[index].first_coefficient;
+    int64_t mean[3];
+    int16_t place[3];
+    for (int c = 0; c < 3; ++c) {
+        mean[c] = recent_.mean[slot][c] = load(at + c);
+        recent_.normal[slot][c] = int16_t(frame.row[2][c]);
+    }
+    coarse_place(mean, place);
+    for (int c = 0; c < 3; ++c) recent_.place[c][slot] = place[c];
+    recent_.life[slot] = life_key(t.birth, t.death, t.flags);
+    recent_.track[slot] = index;
+    std::memcpy(recent_.rest[slot], rest_, sizeof rest_);
+    if (recent_.count < window) ++recent_.count;
+}
+
+/// Distances from x to all that is remembered.
+template <class Coder>
+void ChunkModel<Coder>::measure(const int64_t (&x)[3]) {
+    int16_t from[3];
+    coarse_place(x, from);
+    for (uint32_t i = 0; i < recent_.count; ++i) {
+        const int16_t a = int16_t(from[0] - recent_.place[0][i]), b = int16_t(from[1] - recent_.place[1][i]),
+                      c = int16_t(from[2] - recent_.place[2][i]);
+        distance_[i] = uint32_t(int32_t(a) * a + int32_t(b) * b + int32_t(c) * c);
+    }
+}
+
+/// The nearest of the last measure(), ties by slot; `like`: only those of this life and basis.
+template <class Coder>
+typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_near(bool like, uint32_t life) const {
+    Near near;
+    uint32_t limit = UINT32_MAX;
+    for (uint32_t i = 0; i < recent_.count; ++i) {
+        const uint32_t d = distance_[i];
+        if (d >= limit || (like && recent_.life[i] != life)) continue;
+        uint32_t at = near.count < nearest ? near.count++ : nearest - 1;
+        for (; at > 0 && d < near.distance[at - 1]; --at)
+            near.distance[at] = near.distance[at - 1], near.slot[at] = near.slot[at - 1];
+        near.distance[at] = d, near.slot[at] = i;
+        if (near.count == nearest) limit = near.distance[nearest - 1];
+    }
+    return near;
+}
+
 /// Which half of a box its only point is in: where the planes of the nearest points pass.
 template <class Coder>
-uint32_t ChunkModel<Coder>::leaf_bit(const Box& box, uint32_t dimension, const Near& near, uint32_t value) {
+uint32_t ChunkModel<Coder>::leaf_bit(const Box& box, uint32_t dimension, const Planes& planes, uint32_t value) {
     const uint32_t level = box.bits[dimension];
     const int64_t quarter =
         (int64_t(steps_.ratio) << level) / 4;  // from the centre to that of a half, step/16
     uint32_t side = 0, steep = 0, far = 0, away = 0;
-    if (near.count && !drops_) {
-        int64_t centre[3], height = 0, slope = 0;
-        for (int c = 0; c < 3; ++c)
+    if (planes.count) {
+        int64_t centre[3], height = -planes.height;
+        for (int c = 0; c < 3; ++c) {
             centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
-        for (uint32_t j = 0; j < near.count; ++j) {
-            const int64_t* y = near.mean[j];
-            for (int c = 0; c < 3; ++c) height += (centre[c] - y[c]) * near.normal[j][c] / 16384;
-            slope += near.normal[j][dimension];
-            if (j == 0) {
-                const int64_t offset = rounded_division(2 * (y[dimension] - centre[dimension]), quarter);
-                away = uint32_t(offset < -4 ? 0 : offset > 4 ? 8 : offset + 4);
-            }
+            height += centre[c] * planes.normal[c];
         }
-        height /= near.count, slope /= near.count;
-        const int64_t steepness = slope < 0 ? -slope : slope;
-        steep = steepness > 13000 ? 3 : steepness > 8000 ? 2 : steepness > 3000 ? 1 : 0;
+        /// round(a / b) counted up to `most`, without dividing.
+        const auto steps = [](int64_t a, int64_t b, int32_t most) {
+            int32_t count = 0;
+            for (int32_t j = 1; j <= most; ++j) count += 2 * a >= (2 * j - 1) * b;
+            return count;
+        };
+        const int64_t slope = planes.normal[dimension], steepness = slope < 0 ? -slope : slope;
+        steep = (steepness > 3000 * int64_t(planes.count)) + (steepness > 8000 * int64_t(planes.count)) +
+                (steepness > 13000 * int64_t(planes.count));
         // The plane crosses this axis at −height / slope from the centre.
-        const int64_t crossing = steepness < 500 ? 0 : rounded_division(-height * 16384 * 2, slope * quarter);
-        side = uint32_t(crossing < -6 ? 0 : crossing > 6 ? 12 : crossing + 6);
-        uint64_t ratio = uint64_t(near.distance[0]) / uint64_t(quarter * quarter / 64 + 1);
-        while (ratio > 1 && far < 5) ratio >>= 2, ++far;
+        int32_t crossing = 0;
+        if (steepness >= 500 * int64_t(planes.count))
+            crossing = steps(2 * (height < 0 ? -height : height), steepness * quarter, 6);
+        side = uint32_t((height < 0) == (slope < 0) ? 6 - crossing : 6 + crossing);
+        const int64_t offset = planes.first[dimension] - centre[dimension];
+        const int32_t apart = steps(2 * (offset < 0 ? -offset : offset), quarter, 4);
+        away = uint32_t(offset < 0 ? 4 - apart : 4 + apart);
+        const uint64_t unit = uint64_t(quarter >> search_shift_) * uint64_t(quarter >> search_shift_) + 1;
+        for (uint32_t j = 0; j < 5; ++j) far += planes.distance > (8 * unit) << 2 * j;
     }
     const uint32_t low = at_most(level, 6) - 1;
     return bit(learned_.leaf_mixer[dimension], &learned_.leaf[0][steep * 13 + side],
@@ -63,18 +132,29 @@ uint32_t ChunkModel<Coder>::leaf_bit(const Box& box, uint32_t dimension, const N
 /// The remaining bits of a box with one point, largest dimension first.
 template <class Coder>
 void ChunkModel<Coder>::leaf(Box& box, const RawTrack* source) {
-    const uint32_t index = first_ + done_;
-    int64_t centre[3];
-    for (int c = 0; c < 3; ++c)
-        centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
-    const Near near = find_near(index, centre, nullptr);
+    Planes planes;
+    if (!drops_) {
+        int64_t centre[3];
+        for (int c = 0; c < 3; ++c)
+            centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
+        measure(centre);
+        const Near near = find_near(false, 0);
+        planes.count = near.count;
+        for (uint32_t j = 0; j < near.count; ++j)
+            for (int c = 0; c < 3; ++c) {
+                const int64_t n = recent_.normal[near.slot[j]][c], y = recent_.mean[near.slot[j]][c];
+                planes.height += y * n, planes.normal[c] += n;
+                if (j == 0) planes.first[c] = y;
+            }
+        if (near.count) planes.distance = near.distance[0];
+    }
     for (;;) {
         uint32_t d = 0;
         for (uint32_t c = 1; c < 3; ++c)
             if (box.bits[c] > box.bits[d]) d = c;
         if (box.bits[d] == 0) return;
         const int32_t half = 1 << (box.bits[d] - 1);
-        const uint32_t upper = leaf_bit(box, d, near, source ? source->lattice[d] >= box.low[d] + half : 0);
+        const uint32_t upper = leaf_bit(box, d, planes, source ? source->lattice[d] >= box.low[d] + half : 0);
         if (upper) box.low[d] += half;
         --box.bits[d];
     }
@@ -83,7 +163,7 @@ void ChunkModel<Coder>::leaf(Box& box, const RawTrack* source) {
 /// Birth, death, flags.
 template <class Coder>
 bool ChunkModel<Coder>::life(RawTrack& t, const Near& near, const RawTrack* source) {
-    const Track* like = near.count ? &block_.tracks[near.track[0]] : nullptr;
+    const Track* like = near.count ? &block_.tracks[recent_.track[near.slot[0]]] : nullptr;
     const uint32_t last = samples_ - 1, set = drops_ ? 6 : 0;
     const uint32_t context = like ? 1 + (like->flags & 3) : 0;
     t.flags = 0;
@@ -120,16 +200,17 @@ bool ChunkModel<Coder>::axis(RawTrack& t, const Near& near, const RawTrack* sour
     int64_t sum[3] = {0, 0, 1};
     uint32_t spread = 0;
     for (uint32_t j = 0; j < near.count; ++j) {
-        const int64_t weight = 1 + 1024 * (near.distance[0] + 1) / (near.distance[j] + 1);
-        for (int c = 0; c < 3; ++c) sum[c] += weight * near.normal[j][c];
+        const int16_t* n = recent_.normal[near.slot[j]];
+        const int64_t weight = weight_of(near, j);
+        for (int c = 0; c < 3; ++c) sum[c] += weight * n[c];
         if (j == 1) {
             int64_t difference = 0;
             for (int c = 0; c < 3; ++c) {
-                const int64_t d = near.normal[1][c] - near.normal[0][c];
+                const int64_t d = n[c] - recent_.normal[near.slot[0]][c];
                 difference += d * d;
             }
-            int64_t unit = int64_t(16384 / levels_) * (16384 / levels_) / 2 + 1;
-            for (difference /= unit; difference > 0 && spread < 6; difference >>= 2) ++spread;
+            const int64_t unit = int64_t(16384 / levels_) * (16384 / levels_) / 2 + 1;
+            for (uint32_t k = 0; k < 6; ++k) spread += difference >= unit << 2 * k;
         }
     }
     spread = near.count < 2 ? 0 : 1 + spread;
@@ -164,13 +245,14 @@ void ChunkModel<Coder>::along_axis(RawTrack& t, const Frame& frame, const Near& 
     for (uint32_t j = 0; j < near.count; ++j) {
         int64_t height = 0, along = 0;
         for (int c = 0; c < 3; ++c) {
-            const int64_t both = frame.row[2][c] + near.normal[j][c];
-            height += (near.mean[j][c] - int64_t(t.lattice[c]) * steps_.ratio) * both;
-            along += int64_t(frame.row[2][c]) * both / 16384;
+            const int64_t both = frame.row[2][c] + recent_.normal[near.slot[j]][c];
+            height += (recent_.mean[near.slot[j]][c] - int64_t(t.lattice[c]) * steps_.ratio) * both;
+            along += frame.row[2][c] * both;
         }
+        along >>= 14;
         if (along < 8000) continue;                              // more than about 120° apart: another sheet
         const int64_t offset = rounded_division(height, along);  // step/16
-        const int64_t weight = 1 + 1024 * (near.distance[0] + 1) / (near.distance[j] + 1);
+        const int64_t weight = weight_of(near, j);
         guess += weight * offset, weights += weight;
         least = weights == weight || offset < least ? offset : least;
         most = weights == weight || offset > most ? offset : most;
@@ -205,7 +287,7 @@ bool ChunkModel<Coder>::series(RawTrack& t, const Frame& frame, bool second, con
     const uint32_t wanted_terms = source ? (second ? source->second_terms : source->position_terms) : 0;
     uint32_t terms = start, like_terms = 0;
     for (uint32_t j = 0; j < like.count; ++j) {
-        const Track& other = block_.tracks[like.track[j]];
+        const Track& other = block_.tracks[recent_.track[like.slot[j]]];
         like_terms += second ? other.second_terms : other.position_terms;
     }
     if (like.count) like_terms = (2 * like_terms + like.count) / (2 * like.count);
@@ -231,23 +313,34 @@ bool ChunkModel<Coder>::series(RawTrack& t, const Frame& frame, bool second, con
     return true;
 }
 
-/// Coefficient k of another track in this one's frame and scale, channel c, in 1/256. Lives may differ for k = 1,
-/// the straight part: there the coefficient of a velocity grows as √(n² − 1) with the number of samples n.
+/// Coefficients k of another track in this one's frame and scale, in 1/256; false: it has none. Lives may differ for
+/// k = 1, the straight part: there the coefficient of a velocity grows as √(n² − 1) with the number of samples n.
 template <class Coder>
-int64_t ChunkModel<Coder>::turned_value(const RawTrack& t, const Frame& frame, bool second, uint32_t other,
-                                        uint32_t k, uint32_t c) const {
+bool ChunkModel<Coder>::turned_term(const RawTrack& t, const Frame& frame, bool second, uint32_t other,
+                                    uint32_t k, int64_t (&out)[3]) const {
     const Track& from = block_.tracks[other];
     if (k >= (second ? from.second_terms : from.position_terms) || ((from.flags ^ t.flags) & track_cosine))
-        return 0;
+        return false;
     const float* at =
         block_.coefficients + from.first_coefficient + (second ? 3 * from.position_terms : 0) + 3 * k;
-    int64_t turned = 0;
-    for (int d = 0; d < 3; ++d) turned += int64_t(load(at + d)) * frame.row[c][d];
-    const int64_t ratio = second || drops_ || c == 2 || (t.flags & track_fine) ? 16 : steps_.ratio;
-    turned = turned / 16384 * 16 / ratio;
+    const int64_t v[3] = {load(at), load(at + 1), load(at + 2)};
     const int64_t life = t.death - t.birth + 1, other_life = from.death - from.birth + 1;
-    if (life == other_life) return turned;
-    return turned * square_root((life * life - 1) * 65536 / (other_life * other_life - 1)) / 256;
+    const int64_t longer =
+        life == other_life ? 256 : square_root((life * life - 1) * 65536 / (other_life * other_life - 1));
+    for (int c = 0; c < 3; ++c) {
+        int64_t turned = (v[0] * frame.row[c][0] + v[1] * frame.row[c][1] + v[2] * frame.row[c][2]) >> 14;
+        if (c < 2 && !second && !drops_ && !(t.flags & track_fine)) turned = turned * coarse_scale_ >> 16;
+        out[c] = turned * longer >> 8;
+    }
+    return true;
+}
+
+/// Sixteen levels of an expected magnitude in 1/16, finer than magnitude_class().
+inline uint32_t residual_level(uint32_t expected) {
+    constexpr uint32_t above[15] = {0, 2, 4, 7, 10, 14, 20, 28, 40, 56, 80, 120, 190, 320, 640};
+    uint32_t level = 0;
+    while (level < 15 && expected > above[level]) ++level;
+    return level;
 }
 
 template <class Coder>
@@ -255,6 +348,10 @@ bool ChunkModel<Coder>::term(const RawTrack& t, const Frame& frame, bool second,
                              int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted,
                              int32_t* out) {
     const uint32_t channels = drops_ && second ? 6 : 3;
+    int64_t turned[nearest][3] = {};
+    if (channels == 3)
+        for (uint32_t j = 0; j < like.count; ++j)
+            turned_term(t, frame, second, recent_.track[like.slot[j]], k, turned[j]);
     uint32_t others = 0;
     int32_t residual[6] = {};
     for (uint32_t i = 0; i < channels; ++i) {
@@ -265,16 +362,14 @@ bool ChunkModel<Coder>::term(const RawTrack& t, const Frame& frame, bool second,
         int64_t sum = 0, least = 0, most = 0;  // 1/256
         if (channels == 3)
             for (uint32_t j = 0; j < like.count; ++j) {
-                const int64_t turned = turned_value(t, frame, second, like.track[j], k, c);
-                sum += turned;
-                least = j == 0 || turned < least ? turned : least;
-                most = j == 0 || turned > most ? turned : most;
+                sum += turned[j][c];
+                least = j == 0 || turned[j][c] < least ? turned[j][c] : least;
+                most = j == 0 || turned[j][c] > most ? turned[j][c] : most;
             }
-        const int64_t mean = like.count ? sum / like.count : 0;
+        constexpr int32_t share[nearest + 1] = {0, 65536, 32768, 21845};
+        const int64_t mean = sum * share[like.count] >> 16;
         Statistics::Trust& trust = learned_.trust[kind][at_most(k, 5)];
-        int64_t factor = trust.product * 256 / (trust.square + 1);
-        factor = factor < 0 ? 0 : factor > 256 ? 256 : factor;
-        const int32_t guess = int32_t(rounded_division(mean * factor, 65536));
+        const int32_t guess = int32_t((mean * trust.factor + 32768) >> 16);
         const uint32_t size =
             at_most(magnitude_class(at_most(uint32_t((mean < 0 ? -mean : mean) / 64), 1u << 20)), 7);
         const uint32_t spread =
@@ -282,14 +377,23 @@ bool ChunkModel<Coder>::term(const RawTrack& t, const Frame& frame, bool second,
             : like.count == 1
                 ? 1 + at_most(size / 3, 1)
                 : 3 + at_most(magnitude_class(at_most(uint32_t((most - least) / 64), 1u << 20)), 7);
+        // How large a residual to expect: as the neighbours' of this term, as this track's before, as this term's.
+        uint32_t expected = 0, level = !like.count ? 32 : k > 2 ? 16 : 0;
+        if (channels == 3 && k < rest_terms)
+            for (uint32_t j = 0; j < like.count; ++j) expected += recent_.rest[like.slot[j]][second][k][c];
+        expected = expected * 16 * uint32_t(share[like.count]) >> 16;
+        const uint32_t own = 10 * magnitude(previous[c]) + 4 * magnitude(before[c]) + 6 * others;
+        expected += like.count ? own / 2 : own;
+        level += residual_level(expected);
         const Contexts context = {
-            at_most(k, 11),
+            level,
             at_most(magnitude_class(magnitude(previous[c]) * 2 + magnitude(before[c])), 6) * 7 +
                 at_most(magnitude_class(others), 6),
             spread * 3 + at_most(k / 2, 2),
             size * 6 + at_most(magnitude_class(magnitude(previous[c]) + others), 5)};
         const int32_t value = signed_value(kind, context, wanted[c] - guess);
         residual[c] = value;
+        if (channels == 3 && k < rest_terms) rest_[second][k][c] = uint8_t(at_most(magnitude(value), 255));
         out[c] = value + guess;
         if (magnitude(out[c]) > uint32_t(max_symbol)) {
             reason = "a coefficient is out of range";
@@ -301,6 +405,10 @@ bool ChunkModel<Coder>::term(const RawTrack& t, const Frame& frame, bool second,
             const int64_t said = mean < -(1 << 23) ? -(1 << 23) : mean > 1 << 23 ? 1 << 23 : mean;
             trust.product += (seen * said * 256 - trust.product) / 32;
             trust.square += (said * said - trust.square) / 32;
+            if (trust.seen++ % 8 == 0) {
+                const int64_t factor = trust.product * 256 / (trust.square + 1);
+                trust.factor = int32_t(factor < 0 ? 0 : factor > 256 ? 256 : factor);
+            }
         }
     }
     for (uint32_t c = 0; c < channels; ++c) before[c] = previous[c], previous[c] = residual[c];
@@ -317,7 +425,8 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         x[c] = int64_t(box.low[c]) * steps_.ratio;
         t.position[0][c] = t.second[0][c] = t.second[0][c + 3] = 0;
     }
-    const Near near = find_near(index, x, nullptr);
+    measure(x);
+    const Near near = find_near(false, 0);
     if (!life(t, near, source)) return false;
     Frame frame = identity_frame;
     t.axis[0] = t.axis[1] = 0;
@@ -333,7 +442,8 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         frame = frame_of(t.axis, levels_);
         along_axis(t, frame, near, source);
     }
-    const Near like = find_near(index, x, &t);
+    std::memset(rest_, 0, sizeof rest_);
+    const Near like = find_near(true, life_key(t.birth, t.death, t.flags));
     if (!drops_) coder_.category(bits_motion);
     if (!series(t, frame, false, near, like, source)) return false;
     if (!drops_) coder_.category(bits_normals);
@@ -348,6 +458,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         return false;
     }
     used_ += size;
+    remember(index, t, frame);
     return true;
 }
 
@@ -357,6 +468,7 @@ bool ChunkModel<Coder>::code_set(bool drops, uint32_t first, uint32_t count, con
                                  const uint8_t (&bits)[3], const Source& source) {
     drops_ = drops, first_ = first, done_ = 0;
     if (count == 0) return true;
+    begin_search(low, bits);
     Box stack[3 * 31 + 2];
     uint32_t height = 0;
     stack[height++] = {{low[0], low[1], low[2]}, {bits[0], bits[1], bits[2]}, count};

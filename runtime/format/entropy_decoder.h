@@ -57,6 +57,12 @@ constexpr uint32_t squash(int32_t d) {
     const uint32_t low = uint32_t(d + 2048) & 127, index = uint32_t(d + 2048) >> 7;
     return (table[index] * (128 - low) + table[index + 1] * low + 64) >> 7;
 }
+/// The same, looked up.
+inline constexpr auto squash_table = [] {
+    std::array<uint16_t, 4096> table{};
+    for (int32_t d = -2048; d < 2048; ++d) table[uint32_t(d + 2048)] = uint16_t(squash(d));
+    return table;
+}();
 /// Its inverse by probability in 1/4096.
 inline constexpr auto stretch_table = [] {
     std::array<int16_t, 4096> table{};
@@ -72,48 +78,49 @@ struct Counter {
     uint16_t probability = 32768;  ///< of a 1, in 1/65536
     uint16_t seen = 0;
 };
-inline constexpr uint32_t counter_limit = 60;
-inline constexpr auto counter_rate = [] {
-    std::array<uint16_t, counter_limit + 1> rate{};
-    for (uint32_t n = 0; n <= counter_limit; ++n) rate[n] = uint16_t(2 * 65536 / (2 * n + 3));
-    return rate;
-}();
-/// Trust in a counter by how often it was used, in 1/256: a context never met says nothing.
-inline constexpr auto counter_trust = [] {
-    std::array<uint16_t, counter_limit + 1> trust{};
-    for (uint32_t n = 0; n <= counter_limit; ++n) trust[n] = uint16_t((256 * (2 * n + 1)) / (2 * n + 4));
-    return trust;
+inline constexpr uint32_t counter_limit = 40;
+/// By how often a counter was used: how fast it learns, in 1/32768; and how far it is trusted, in 1/256, for a
+/// context never met says nothing.
+struct Pace {
+    uint16_t rate, trust;
+};
+inline constexpr auto counter_pace = [] {
+    std::array<Pace, counter_limit + 1> pace{};
+    for (uint32_t n = 0; n <= counter_limit; ++n)
+        pace[n] = {uint16_t(2 * 32768 / (2 * n + 3)), uint16_t((256 * (2 * n + 1)) / (2 * n + 4))};
+    return pace;
 }();
 
 inline void learn(Counter& c, uint32_t bit) {
-    const int32_t error = (bit ? 65535 : 0) - int32_t(c.probability);
-    c.probability = uint16_t(int32_t(c.probability) + int32_t(int64_t(error) * counter_rate[c.seen] / 65536));
+    const int32_t error = int32_t(bit ? 65535 : 0) - int32_t(c.probability);
+    c.probability = uint16_t(int32_t(c.probability) + (error * int32_t(counter_pace[c.seen].rate) >> 15));
     if (c.seen < counter_limit) ++c.seen;
 }
 
 /// Weights that blend the opinions of up to four contexts, in 1/65536.
 struct Mixer {
     static constexpr uint32_t inputs = 4;
-    int32_t weight[inputs] = {20000, 20000, 20000, 20000};
+    uint32_t weight[inputs] = {20000, 20000, 20000, 20000};  ///< signed, modulo 2³²: bytes made to overflow it may
 };
 
 /// One bit under the blended probability of four contexts; every part learns from it.
 template <class Coder>
 inline uint32_t mixed_bit(Coder& coder, Mixer& mixer, Counter* const (&context)[Mixer::inputs],
                           uint32_t value) {
-    int32_t opinion[Mixer::inputs], dot = 0;
+    int32_t opinion[Mixer::inputs];
+    uint32_t sum = 0;
     for (uint32_t i = 0; i < Mixer::inputs; ++i) {
         const Counter& c = *context[i];
-        opinion[i] = stretch_table[c.probability >> 4] * int32_t(counter_trust[c.seen]) / 256;
-        dot += int32_t(int64_t(opinion[i]) * mixer.weight[i] / 4096);
+        opinion[i] = stretch_table[c.probability >> 4] * int32_t(counter_pace[c.seen].trust) >> 8;
+        sum += uint32_t(opinion[i]) * mixer.weight[i];
     }
-    dot /= 16;
-    const uint32_t p = squash(dot);
+    int32_t dot = int32_t(sum) >> 16;
+    dot = dot < -2047 ? -2047 : dot > 2047 ? 2047 : dot;
+    const uint32_t p = squash_table[uint32_t(dot + 2048)];
     const uint32_t bit = coder.bit(p, value);
-    const int32_t error = (bit ? 65535 : 0) - int32_t(p);
+    const int32_t error = ((bit ? 65535 : 0) - int32_t(p)) * 14 >> 4;
     for (uint32_t i = 0; i < Mixer::inputs; ++i) {
-        const int32_t weight = mixer.weight[i] + (opinion[i] * (error / 16) * 10 + 32768) / 65536;
-        mixer.weight[i] = weight < -(1 << 18) ? -(1 << 18) : weight > (1 << 18) ? 1 << 18 : weight;
+        mixer.weight[i] += uint32_t((opinion[i] * error + 32768) >> 16);
         learn(*context[i], bit);
     }
     return bit;

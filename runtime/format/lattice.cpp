@@ -28,9 +28,9 @@ void unfold(const int32_t axis[2], int32_t levels, int64_t out[3]) {
 
 int64_t square_root(int64_t x) noexcept {
     if (x <= 0) return 0;
-    int64_t root = 0;
-    for (int64_t bit = int64_t(1) << 30; bit; bit >>= 1)
-        if ((root | bit) * (root | bit) <= x) root |= bit;
+    int64_t root = int64_t(std::sqrt(double(x)));  // nearly; made exact whatever the machine's root is
+    while (root * root > x) --root;
+    while ((root + 1) * (root + 1) <= x) ++root;
     return root;
 }
 

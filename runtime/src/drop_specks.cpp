@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Surface cells without specks: one corner, or two side by side, of a sign that none of their neighbours share. Such
-// a speck is smaller than the mesh resolves; most come from where patches of sharp rims end (a violent splash had 15
-// of 12 triangles each in a frame). The march has visited all cells round a speck, so that its neighbours are
-// known, and every tile that shares one of its corners comes to the same answer. Corners that tiles of different size
-// share stay as they are: those see other neighbours.
+// Surface cells without specks: pieces of one corner or two, or of a few that fewer than three points stand by. They are
+// what the field means where patches of sharp rims end, not liquid: a violent splash had 15 in a frame, of 12 to 50
+// triangles. The march has visited all cells round a piece, so that its neighbours are known. Corners that tiles of
+// different size share stay as they are: those see other neighbours.
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "mesher.h"
@@ -11,106 +12,176 @@
 namespace rill {
 namespace {
 
+constexpr uint32_t always_speck = 2, most_corners = 24, enough_points = 3;
+constexpr int widest = 7;  // steps from the first corner: a piece lies in its tile and those beside
+
 enum class Sign { unknown, outside, inside };
+struct Place {
+    int x, y, z;  ///< of a corner, from the tile's first one; may lie beyond its faces
+    bool operator==(const Place& o) const { return x == o.x && y == o.y && z == o.z; }
+    bool before(const Place& o) const { return z != o.z ? z < o.z : y != o.y ? y < o.y : x < o.x; }
+};
 
 /// One of the tiles that hold the corner has cells of another size.
-bool on_mixed_border(const Tile& tile, const int place[3]) {
+bool on_mixed_border(const Tile& tile, int x, int y, int z) {
     if (!tile.beside) return false;
-    int from[3], to[3];
-    for (int a = 0; a < 3; ++a) from[a] = place[a] == 0 ? -1 : 0, to[a] = place[a] == tile_cells ? 1 : 0;
-    for (int z = from[2]; z <= to[2]; ++z)
-        for (int y = from[1]; y <= to[1]; ++y)
-            for (int x = from[0]; x <= to[0]; ++x)
-                if (tile.at_place(place_of(x, y, z)) != beside_same) return true;
+    const auto first = [](int at) { return at == 0 ? -1 : 0; };
+    const auto last = [](int at) { return at == tile_cells ? 1 : 0; };
+    for (int k = first(z); k <= last(z); ++k)
+        for (int j = first(y); j <= last(y); ++j)
+            for (int i = first(x); i <= last(x); ++i)
+                if (tile.at_place(place_of(i, j, k)) != beside_same) return true;
     return false;
 }
 
-/// Sign of a corner by its place from the tile's first one; places may lie beyond its faces.
-Sign sign_at(const Mesher& m, const Tile& tile, const int at[3]) {
+Sign sign_of(const Tile& tile, int x, int y, int z) {
+    const uint32_t row = uint32_t(y + 9 * z);
+    if (!(tile.known[row] >> x & 1) || on_mixed_border(tile, x, y, z)) return Sign::unknown;
+    return tile.inside[row] >> x & 1 ? Sign::inside : Sign::outside;
+}
+Sign sign_at(const Mesher& m, const Tile& tile, const Place& at) {
+    const int p[3] = {at.x, at.y, at.z};
     int32_t coord[3];
     int place[3];
     bool beyond = false;
     for (int a = 0; a < 3; ++a) {
-        const int away = at[a] < 0 ? -1 : at[a] > tile_cells ? 1 : 0;
-        coord[a] = tile.coord[a] + away, place[a] = at[a] - away * tile_cells;
+        const int away = p[a] < 0 ? -1 : p[a] > tile_cells ? 1 : 0;
+        coord[a] = tile.coord[a] + away, place[a] = p[a] - away * tile_cells;
         beyond = beyond || away;
     }
-    const uint32_t index = beyond ? find_tile(m, tile.level, coord) : no_tile;
-    if (beyond && index == no_tile) return Sign::unknown;
-    const Tile& holder = beyond ? m.tiles[index] : tile;
-    const uint32_t row = uint32_t(place[1] + 9 * place[2]);
-    if (!(holder.known[row] >> place[0] & 1) || on_mixed_border(holder, place)) return Sign::unknown;
-    return holder.inside[row] >> place[0] & 1 ? Sign::inside : Sign::outside;
+    if (!beyond) return sign_of(tile, at.x, at.y, at.z);
+    const uint32_t index = find_tile(m, tile.level, coord);
+    return index == no_tile ? Sign::unknown : sign_of(m.tiles[index], place[0], place[1], place[2]);
 }
 
-/// How many of the six neighbours share the sign; `twin` is one of them. More than one when some are unknown.
-int count_alike(const Mesher& m, const Tile& tile, const int at[3], Sign sign, int twin[3]) {
-    int alike = 0;
-    for (int side = 0; side < 6 && alike < 2; ++side) {
-        int beside[3] = {at[0], at[1], at[2]};
-        beside[side / 2] += side & 1 ? 1 : -1;
-        const Sign other = sign_at(m, tile, beside);
-        if (other == Sign::unknown) return 2;
-        if (other == sign) ++alike, std::memcpy(twin, beside, sizeof(beside));
-    }
-    return alike;
-}
+/// Corners of one sign, joined along edges.
+struct Piece {
+    Place corner[most_corners];
+    uint32_t count = 0;
+    bool holds(const Place& p) const { return std::find(corner, corner + count, p) != corner + count; }
+};
 
-bool is_speck(const Mesher& m, const Tile& tile, const int at[3]) {
-    const Sign sign = sign_at(m, tile, at);
+/// The piece whose first corner is `first`; false when that is not its first, when it is large, or not all known.
+bool collect(const Mesher& m, const Tile& tile, const Place& first, Piece& piece) {
+    const Sign sign = sign_at(m, tile, first);
     if (sign == Sign::unknown) return false;
-    int twin[3] = {}, back[3] = {};
-    const int alike = count_alike(m, tile, at, sign, twin);
-    return alike == 0 || (alike == 1 && count_alike(m, tile, twin, sign, back) == 1);
+    piece.corner[0] = first, piece.count = 1;
+    for (uint32_t k = 0; k < piece.count; ++k)
+        for (int side = 0; side < 6; ++side) {
+            Place p = piece.corner[k];
+            (side / 2 == 0 ? p.x : side / 2 == 1 ? p.y : p.z) += side & 1 ? 1 : -1;
+            const Sign other = sign_at(m, tile, p);
+            if (other == Sign::unknown) return false;
+            if (other != sign || piece.holds(p)) continue;
+            if (p.before(first) || piece.count == most_corners || std::abs(p.x - first.x) > widest ||
+                std::abs(p.y - first.y) > widest || p.z - first.z > widest) return false;
+            piece.corner[piece.count++] = p;
+        }
+    return true;
 }
 
-/// Known corners of a row of which at most one neighbour within the tile is alike: the rest cannot be specks.
-uint32_t suspects(const Tile& tile, uint32_t y, uint32_t z) {
+/// Points in the cells that have a corner of the piece.
+uint32_t count_points(const Mesher& m, MesherScratch& s, const Tile& tile, const Piece& piece) {
+    int lower[3] = {piece.corner[0].x, piece.corner[0].y, piece.corner[0].z}, upper[3];
+    std::memcpy(upper, lower, sizeof(upper));
+    for (uint32_t k = 1; k < piece.count; ++k) {
+        const int p[3] = {piece.corner[k].x, piece.corner[k].y, piece.corner[k].z};
+        for (int a = 0; a < 3; ++a) lower[a] = std::min(lower[a], p[a]), upper[a] = std::max(upper[a], p[a]);
+    }
+    surface::Box box;
+    for (int a = 0; a < 3; ++a) {
+        box.lower[a] = float(tile_cells * tile.coord[a] + lower[a] - 1) * tile.cell;
+        box.upper[a] = float(tile_cells * tile.coord[a] + upper[a] + 1) * tile.cell;
+    }
+    const surface::Field& f = *m.input.field;
+    const uint32_t found = std::min(m.access.gather(f, box, s.candidates, s.most_candidates), s.most_candidates);
+    uint32_t count = 0;
+    for (uint32_t c = 0; c < found; ++c) {
+        const uint32_t j = s.candidates[c];
+        if (j >= f.point_count) return enough_points;  // a drop is what it is
+        const auto cell = [&](float x, int a) {
+            const float c = std::floor(x / tile.cell) - float(tile_cells * tile.coord[a]);
+            return int(std::clamp(c, -100.f, 100.f));
+        };
+        const int x = cell(f.x[j], 0), y = cell(f.y[j], 1), z = cell(f.z[j], 2);
+        bool beside = false;
+        for (int k = 0; k < 8; ++k) beside = beside || piece.holds({x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)});
+        count += beside;
+    }
+    return count;
+}
+
+/// Known corners of a row that may be the first of their piece: those before it along x, y, z are of the other sign.
+uint32_t firsts(const Tile& tile, uint32_t y, uint32_t z) {
     const uint32_t row = y + 9 * z, own = tile.inside[row];
-    uint32_t once = 0, twice = 0;
-    const auto count = [&](uint32_t alike) { twice |= once & alike, once |= alike; };
-    count(~(own ^ own << 1) & 0x1fe), count(~(own ^ own >> 1) & 0x0ff);
-    if (y > 0) count(~(own ^ tile.inside[row - 1]));
-    if (y < 8) count(~(own ^ tile.inside[row + 1]));
-    if (z > 0) count(~(own ^ tile.inside[row - 9]));
-    if (z < 8) count(~(own ^ tile.inside[row + 9]));
-    return tile.known[row] & ~twice & 0x1ff;
+    uint32_t bits = tile.known[row] & 0xff & ((own ^ own << 1) | 1);
+    if (y > 0) bits &= own ^ tile.inside[row - 1];
+    if (z > 0) bits &= own ^ tile.inside[row - 9];
+    return bits;
 }
 
-void find_specks(const Mesher& m, Tile& tile) {
-    for (uint32_t row = 0; row < 81; ++row) {
+void find_specks(const Mesher& m, MesherScratch& s, Tile& tile) {
+    tile.has_specks = false;
+    Piece piece;
+    for (uint32_t row = 0; row < rows_per_tile; ++row) {
         tile.speck[row] = 0;
-        uint32_t bits = suspects(tile, row % 9, row / 9);
+        uint32_t bits = firsts(tile, row % 8, row / 8);
         for (int x = 0; bits; ++x, bits >>= 1) {
-            const int at[3] = {x, int(row % 9), int(row / 9)};
-            if (bits & 1 && is_speck(m, tile, at)) tile.speck[row] |= uint16_t(1 << x);
+            if (!(bits & 1) || !collect(m, tile, {x, int(row % 8), int(row / 8)}, piece)) continue;
+            if (piece.count > always_speck && count_points(m, s, tile, piece) >= enough_points) continue;
+            tile.speck[row] |= uint8_t(1 << x);
+            tile.has_specks = true;
         }
     }
 }
 
-void turn_specks(Tile& tile) {
-    bool any = false;
-    for (uint32_t row = 0; row < 81; ++row) {
-        tile.inside[row] ^= tile.speck[row];
-        any = any || tile.speck[row];
-        for (uint32_t x = 0, bits = tile.speck[row]; bits; ++x, bits >>= 1)
-            if (bits & 1) tile.value[x + 9 * row] *= -1;
+/// Gives a corner the other sign in every tile that has it.
+void turn_corner(Mesher& m, const Tile& tile, const Place& at) {
+    const int p[3] = {at.x, at.y, at.z};
+    for (int k = 0; k < 8; ++k) {
+        int32_t coord[3];
+        int place[3];
+        bool held = true;
+        for (int a = 0; a < 3; ++a) {
+            const int global = tile_cells * tile.coord[a] + p[a], down = k >> a & 1;
+            coord[a] = (global >= 0 ? global : global - tile_cells + 1) / tile_cells - down;
+            place[a] = global - tile_cells * coord[a];
+            held = held && place[a] <= tile_cells;
+        }
+        const uint32_t index = held ? find_tile(m, tile.level, coord) : no_tile;
+        if (index == no_tile) continue;
+        Tile& holder = m.tiles[index];
+        const int row = place[1] + 9 * place[2];
+        holder.inside[row] ^= uint16_t(1 << place[0]);
+        holder.value[place[0] + 9 * row] *= -1;
+        for (uint32_t r = 0; r < rows_per_tile; ++r) holder.surface[r] &= surface_cells(holder, r);
     }
-    for (uint32_t row = 0; any && row < rows_per_tile; ++row) tile.surface[row] &= surface_cells(tile, row);
 }
 
 }  // namespace
 
-uint32_t prepare_specks(void* mesher) {
+uint32_t prepare_find_specks(void* mesher) {
     return tasks_of(static_cast<Mesher*>(mesher)->tile_count, tiles_per_quick_task);
 }
-void run_find_specks(void* mesher, uint32_t task, uint32_t) {
+void run_find_specks(void* mesher, uint32_t task, uint32_t worker) {
     const Mesher& m = *static_cast<Mesher*>(mesher);
-    for_tiles(task, tiles_per_quick_task, m.tile_count, [&](uint32_t i) { find_specks(m, m.tiles[i]); });
+    for_tiles(task, tiles_per_quick_task, m.tile_count,
+              [&](uint32_t i) { find_specks(m, m.scratch[worker], m.tiles[i]); });
 }
-void run_turn_specks(void* mesher, uint32_t task, uint32_t) {
-    const Mesher& m = *static_cast<Mesher*>(mesher);
-    for_tiles(task, tiles_per_quick_task, m.tile_count, [&](uint32_t i) { turn_specks(m.tiles[i]); });
+
+/// They are few, and their corners stand in several tiles: one thread turns them.
+uint32_t prepare_turn_specks(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    Piece piece;
+    for (uint32_t i = 0; i < m.tile_count; ++i) {
+        const Tile& tile = m.tiles[i];
+        if (!tile.has_specks) continue;
+        for (uint32_t row = 0; row < rows_per_tile; ++row)
+            for (int x = 0; x < tile_cells; ++x)
+                if (tile.speck[row] >> x & 1 && collect(m, tile, {x, int(row % 8), int(row / 8)}, piece))
+                    for (uint32_t k = 0; k < piece.count; ++k) turn_corner(m, tile, piece.corner[k]);
+    }
+    return 0;
 }
 
 }  // namespace rill

@@ -101,11 +101,11 @@ uint32_t prepare_mesh(void* mesher) {
                 if (!tasks) m.phase = MeshPhase::find_specks;
                 break;
             case MeshPhase::find_specks:
-                tasks = prepare_specks(mesher), m.run = run_find_specks;
+                tasks = prepare_find_specks(mesher), m.run = run_find_specks;
                 m.phase = MeshPhase::turn_specks;
                 break;
             case MeshPhase::turn_specks:
-                tasks = prepare_specks(mesher), m.run = run_turn_specks;
+                prepare_turn_specks(mesher);
                 m.phase = MeshPhase::counts;
                 break;
             case MeshPhase::counts:

@@ -37,7 +37,8 @@ struct Tile {
     uint64_t cross[6];               ///< cells wanted of the neighbour beyond each face, this round
     uint16_t known[81], inside[81];  ///< corners evaluated; those of negative value
     uint64_t turned[6];              ///< faces on borders with finer tiles, as `cross`: see turn_border_faces()
-    uint16_t speck[81];              ///< corners whose sign is noise
+    uint8_t speck[rows_per_tile];    ///< corners that begin a piece which is noise; the tile's own, as cells
+    bool has_specks;
     float lower[3], upper[3];        ///< of all vertices its triangles use
     Beside at_place(uint32_t place) const { return Beside(beside >> (2 * place) & 3); }
     union {
@@ -172,9 +173,9 @@ uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
 
 // drop_specks.cpp
-uint32_t prepare_specks(void* mesher);
+uint32_t prepare_find_specks(void* mesher);
 void run_find_specks(void* mesher, uint32_t task, uint32_t worker);
-void run_turn_specks(void* mesher, uint32_t task, uint32_t worker);
+uint32_t prepare_turn_specks(void* mesher);
 
 // cells_to_vertices.cpp
 uint32_t prepare_counts(void* mesher);
