@@ -150,6 +150,8 @@ struct Clip {
     uint32_t points = 600, layers = 3;
     bool uneven = false;               ///< frame times, steps of 0.9 … 1.1 of even
     bool drop = false;                 ///< one drop beside the ball
+    uint32_t across = 0;               ///< blocks are so many cubed boxes of the ball; 0: two halves, wide bounds
+    float cell = 0.08f;                ///< the source's
     std::string settings = "{\"made\":\"by the tests\"}";
 
     static constexpr double fps = 24;
@@ -187,7 +189,31 @@ inline rill::cooker::TrackSamples drop_track(uint32_t samples) {
     return track;
 }
 
-/// Two blocks (x < 0 and the rest), `layers` layers of which each doubles the points.
+/// Block of a direction, and the box of its part of the ball.
+inline uint32_t block_of(const Clip& clip, glm::vec3 direction) {
+    if (!clip.across) return direction.x < 0 ? 0 : 1;
+    uint32_t block = 0;
+    for (int a = 2; a >= 0; --a)
+        block = block * clip.across + std::min(uint32_t((direction[a] + 1) / 2 * float(clip.across)), clip.across - 1);
+    return block;
+}
+inline void bound_chunk(const Clip& clip, uint32_t block, uint32_t first, uint32_t samples,
+                        rill::cooker::ChunkToWrite& chunk) {
+    if (!clip.across) {
+        chunk.lower = {block ? -0.5f : -1.5f, -1.01f, -1.01f};
+        chunk.upper = {block ? 1.5f : 0.5f, clip.drop && block ? 3.3f : 1.01f, 1.01f};
+        return;
+    }
+    const float size = 2 / float(clip.across);
+    glm::vec3 low(1e9f), high(-1e9f);
+    for (uint32_t s = 0; s < samples; ++s)
+        low = glm::min(low, Clip::centre(clip.seconds(first + s))), high = glm::max(high, Clip::centre(clip.seconds(first + s)));
+    const glm::vec3 corner = size * glm::vec3(block % clip.across, block / clip.across % clip.across, block / clip.across / clip.across);
+    chunk.lower = low + corner - 1.01f;
+    chunk.upper = high + corner + size - 0.99f;
+}
+
+/// Blocks as Clip says, `layers` layers of which each doubles the points.
 inline std::vector<rill::cooker::ChunkToWrite> ball_chunks(const Clip& clip, uint32_t first, uint32_t samples) {
     using namespace rill;
     const cooker::Quantiser quantiser{1e-4f, 2, 1e-3f, 2e-4f, 2e-3f};
@@ -196,30 +222,30 @@ inline std::vector<rill::cooker::ChunkToWrite> ball_chunks(const Clip& clip, uin
     format::BasisTables tables{};
     format::build_basis_tables(tables, memory.data(), samples);
 
-    std::vector<std::vector<cooker::QuantisedTrack>> sets(clip.layers * 2);
+    const uint32_t blocks = clip.across ? clip.across * clip.across * clip.across : 2;
+    std::vector<std::vector<cooker::QuantisedTrack>> sets(clip.layers * blocks);
     for (uint32_t i = 0; i < clip.points; ++i) {
         // i in bit-reversed halves: every prefix is even.
         uint32_t layer = clip.layers - 1, stride = i;
         while (layer > 0 && stride % 2 == 0) stride /= 2, --layer;
         const glm::vec3 direction = on_sphere(i, clip.points);
         const cooker::TrackSamples track = ball_track(clip, direction, first, samples);
-        sets[layer * 2 + (direction.x < 0 ? 0 : 1)].push_back(quantise_track(track, quantiser, origin, tables));
+        sets[layer * blocks + block_of(clip, direction)].push_back(quantise_track(track, quantiser, origin, tables));
     }
     if (clip.drop) sets[1].push_back(quantise_track(drop_track(samples), quantiser, origin, tables));
 
     std::vector<cooker::ChunkToWrite> chunks;
     uint32_t points = 0;
     for (uint32_t layer = 0; layer < clip.layers; ++layer) {
-        points += uint32_t(sets[layer * 2].size() + sets[layer * 2 + 1].size());
-        for (uint32_t block = 0; block < 2; ++block) {
-            const auto& set = sets[layer * 2 + block];
+        for (uint32_t block = 0; block < blocks; ++block) points += uint32_t(sets[layer * blocks + block].size());
+        for (uint32_t block = 0; block < blocks; ++block) {
+            const auto& set = sets[layer * blocks + block];
             if (set.empty()) continue;
             cooker::ChunkToWrite chunk;
             chunk.encoded = encode_chunk(set, quantiser, origin, samples, {});
             chunk.layer = layer;
             chunk.block = block;
-            chunk.lower = {block ? -0.5f : -1.5f, -1.01f, -1.01f};
-            chunk.upper = {block ? 1.5f : 0.5f, clip.drop && block ? 3.3f : 1.01f, 1.01f};
+            bound_chunk(clip, block, first, samples, chunk);
             chunk.spacing = std::sqrt(12.6f / float(std::max(points, 1u)));
             chunks.push_back(std::move(chunk));
         }
@@ -245,7 +271,7 @@ inline rill::cooker::AssetFacts ball_facts(const Clip& clip) {
     facts.layer_count = clip.layers;
     facts.frames_per_second = Clip::fps;
     for (uint32_t f = 0; clip.uneven && f < clip.frames; ++f) facts.frame_seconds.push_back(clip.seconds(f));
-    facts.cell_size = 0.08f;
+    facts.cell_size = clip.cell;
     facts.lower = {-1.5f, -1.1f, -1.1f};
     facts.upper = {1.5f, clip.drop ? 3.3f : 1.1f, 1.1f};
     facts.settings_json = clip.settings;
@@ -256,7 +282,8 @@ inline void write_ball(const Clip& clip, const std::string& path) {
     rill::cooker::AssetWriter writer(path);
     for (uint32_t first = 0; first == 0 || first + 1 < clip.frames; first += clip.window) {
         const uint32_t samples = std::min(clip.window + 1, clip.frames - first);
-        writer.add_window(first, samples, 2, ball_chunks(clip, first, samples));
+        writer.add_window(first, samples, clip.across ? clip.across * clip.across * clip.across : 2,
+                          ball_chunks(clip, first, samples));
     }
     writer.finish(ball_facts(clip));
 }

@@ -166,6 +166,7 @@ struct Setup {
     uint32_t vertices = 200000, workers = 1, tiles = 0;
     uint32_t vertex_capacity = 100000, index_capacity = 1200000, range_capacity = 4096;
     std::vector<FrustumPlanes> views{};
+    std::vector<std::array<float, 4>> eyes{};  ///< position, reach
     const FieldAccess* access = nullptr;
     bool streams = true;
 };
@@ -194,7 +195,13 @@ inline Mesh mesh(const surface::Field& field, const Setup& setup) {
     target.ranges = out.ranges.empty() ? &no_range : out.ranges.data();
     target.vertex_capacity = setup.vertex_capacity, target.index_capacity = setup.index_capacity;
     target.range_capacity = setup.range_capacity;
-    begin_mesh(mesher, {&field, setup.cell, setup.views.data(), uint32_t(setup.views.size()), true, &target});
+    Levels levels{};
+    levels.cell_size = setup.cell;
+    for (const auto& eye : setup.eyes) {
+        std::copy(eye.begin(), eye.begin() + 3, levels.eyes[levels.eye_count]);
+        levels.reach[levels.eye_count++] = eye[3];
+    }
+    begin_mesh(mesher, {&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, &target});
     uint32_t count;
     const Stage* stages = mesh_stages(&count);
     if (setup.workers > 1)

@@ -132,11 +132,11 @@ TEST_CASE("patch tables: every pattern closes, and only 36 have a doubled face")
         const CellPatches &patches = cell_patches[signs], &turned = cell_patches[256 + signs];
         CHECK((patches.count > 0) == (signs != 0 && signs != 255));
         CHECK(patches.count <= 4);
-        if (patches.doubled_face == CellPatches::no_face) continue;
+        if (patches.doubled == 0) continue;
         ++doubled;
         CHECK(patches.count == 1);
         CHECK(turned.count == 2);
-        CHECK(turned.doubled_face == CellPatches::no_face);
+        CHECK(turned.doubled == 0);
     }
     CHECK(doubled == 36);
 }

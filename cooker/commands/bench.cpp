@@ -146,7 +146,7 @@ int bench_command(const BenchOptions& options) {
     const std::vector<uint32_t> frames = frames_asked_for(directory, options);
     const int most_jobs = options.jobs > 0 ? options.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
     std::vector<size_t> ahead = forward(frames.size()), back(ahead.rbegin(), ahead.rend());
-    std::vector<Pass> passes;
+    std::vector<Pass> passes, details;
     nlohmann::json memory;
     DracoRate draco;
     double file_bytes = double(directory.header.file_bytes), bytes_read = 0;
@@ -159,6 +159,13 @@ int bench_command(const BenchOptions& options) {
         if (jobs > 1) continue;
         passes.push_back(run_pass(player, "backward", jobs, frames, back, -1));
         passes.push_back(run_pass(player, "jumps", jobs, frames, jumps(frames.size()), 0));
+        for (int level = 1; level <= 3; ++level) {
+            player.look(player.info().cell_size * float(1 << level), false);
+            details.push_back(run_pass(player, "cells x" + std::to_string(1 << level), jobs, frames, ahead, 1));
+        }
+        player.look(0, true);
+        details.push_back(run_pass(player, "an eighth", jobs, frames, ahead, 1));
+        player.look(0, false);
         memory = {{"allocations_until_created", at_start}, {"peak_bytes", player.peak_bytes()}};
         draco = draco_rate(player, frames);
     }
@@ -174,6 +181,7 @@ int bench_command(const BenchOptions& options) {
                                {"mean_us", pass.mean(stage_total)},
                                {"speedup", pass.mean(stage_total) > 0 ? passes[1].mean(stage_total) / pass.mean(stage_total) : 0}});
     }
+    for (const Pass& pass : details) frame_allocations += pass.frame_allocations, list.push_back(to_json(pass));
     const double rill_rate = passes[1].triangles_per_second(stage_processor), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
     const nlohmann::json json = {
         {"report", "rill bench"},
@@ -198,6 +206,7 @@ int bench_command(const BenchOptions& options) {
         std::printf("               mean microseconds per frame                                   total\n");
         std::printf("pass      jobs     plan  decode   field    mesh    wait   total processor       p50     p99     max  Mtri/s  allocations, output hash\n");
         for (const Pass& pass : passes) print(pass);
+        for (const Pass& pass : details) print(pass);
         std::printf("output %s; %llu allocations in frames; %s read cold; peak memory %s\n", same ? "identical in all passes" : "DIFFERS between passes",
                     static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
                     readable_bytes(memory["peak_bytes"].get<double>()).c_str());

@@ -71,6 +71,17 @@ BenchPlayer::~BenchPlayer() {
     if (pool_) stop_threads(pool_);
 }
 
+void BenchPlayer::look(float cell_size, bool eighth) {
+    cell_size_ = cell_size, eighth_ = eighth;
+    view_ = {};
+    view_.pixels_per_radian = 1000;
+    for (auto& plane : view_.planes) plane[3] = 1;
+    for (int a = 0; a < 3; ++a) {
+        view_.eye[a] = info_.upper[a];
+        view_.planes[a][a] = 1, view_.planes[a][3] = -(info_.lower[a] + info_.upper[a]) / 2;
+    }
+}
+
 BenchFrame BenchPlayer::play(double seconds, float rate, Mesh* mesh) {
     const uint32_t stride = sizeof(glm::vec3);
     Target target{};
@@ -82,6 +93,8 @@ BenchFrame BenchPlayer::play(double seconds, float rate, Mesh* mesh) {
     frame.seconds = seconds, frame.rate = rate;
     frame.asset_to_world[0] = frame.asset_to_world[5] = frame.asset_to_world[10] = 1;
     frame.budget.microseconds = UINT32_MAX;  // no limit, but the stages are timed
+    frame.budget.cell_size = cell_size_;
+    if (eighth_) frame.views = &view_, frame.view_count = 1, frame.budget.cell_size = std::max(cell_size_, info_.cell_size);
     frame.target = &target;
     frame.wait_for_data = true;
     Stats stats{};

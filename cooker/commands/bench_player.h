@@ -42,6 +42,8 @@ public:
     double seconds_of(uint32_t frame) const { return frame_seconds(asset_, frame); }
     /// One frame, waited for; `mesh`, if given, gets a copy of the output.
     BenchFrame play(double seconds, float rate, Mesh* mesh = nullptr);
+    /// What the frames after this ask for: a cell size (0: the source's), and whether an eighth of the bounds is in sight.
+    void look(float cell_size, bool eighth);
     uint64_t allocations() const { return memory_.allocations; }
     uint64_t peak_bytes() const { return memory_.peak_bytes; }
     uint64_t bytes_read() const { return bytes_read_; }
@@ -56,6 +58,9 @@ private:
     Player* player_ = nullptr;
     AssetInfo info_{};
     uint64_t bytes_read_ = 0;
+    float cell_size_ = 0;
+    View view_{};
+    bool eighth_ = false;
     std::vector<glm::vec3> positions_, normals_, velocities_;
     std::vector<uint32_t> indices_;
     std::vector<Range> ranges_;

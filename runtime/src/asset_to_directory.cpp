@@ -67,8 +67,9 @@ uint32_t saturate(uint64_t x) { return uint32_t(std::min<uint64_t>(x, UINT32_MAX
 
 void sum_up_windows(Directory& d) {
     uint64_t most_three = 0, last = 0, last_but_one = 0;
-    for (uint32_t i = 0; i < d.header.window_count; ++i) {
-        const format::WindowRecord& w = d.tables.windows[i];
+    // Twice round the end: clips that loop hold the last windows beside the first.
+    for (uint32_t i = 0; i < d.header.window_count + 2; ++i) {
+        const format::WindowRecord& w = d.tables.windows[i % d.header.window_count];
         const WindowNeed need = need_of(d.tables, w);
         d.info.most_points = std::max(d.info.most_points, saturate(need.points + need.drops));
         d.info.largest_window_bytes = std::max(d.info.largest_window_bytes, need.bytes);
@@ -84,17 +85,20 @@ void sum_up_windows(Directory& d) {
     d.suggested_resident_bytes = align_up(most_three + most_three / 8 + 4096);
 }
 
-/// A layer's spacing is the mean over the clip weighted by its points, so that the choice of layers
-/// does not jump from window to window.
-void average_spacings(Directory& d) {
+/// The mean over the clip weighted by points, so that the choice of layers does not jump from window to window. What
+/// a layer leaves wrong is its p99 error or, where none was measured, what its spacing hides.
+void average_errors(Directory& d) {
+    constexpr float hidden = 1 / 3.f;  // of the spacing
     double sum[format::max_layers] = {}, weight[format::max_layers] = {};
     for (uint32_t i = 0; i < d.header.chunk_count; ++i) {
         const format::ChunkRecord& c = d.tables.chunks[i];
-        sum[c.layer] += double(c.spacing) * c.point_count;
+        sum[c.layer] += double(c.error_p99 > 0 ? c.error_p99 : hidden * c.spacing) * c.point_count;
         weight[c.layer] += c.point_count;
     }
-    for (uint32_t l = 0; l < d.header.layer_count; ++l)
-        d.layer_spacing[l] = weight[l] > 0 ? float(sum[l] / weight[l]) : l ? d.layer_spacing[l - 1] : 0;
+    for (uint32_t l = 0; l < d.header.layer_count; ++l) {
+        d.layer_error[l] = weight[l] > 0 ? float(sum[l] / weight[l]) : 0;
+        if (l && !(d.layer_error[l] < d.layer_error[l - 1])) d.layer_error[l] = d.layer_error[l - 1];
+    }
 }
 
 void describe(Directory& d) {
@@ -114,7 +118,7 @@ void describe(Directory& d) {
     info.content_hash = h.content_hash;
     info.settings_json = reinterpret_cast<const char*>(d.tables.settings);
     sum_up_windows(d);
-    average_spacings(d);
+    average_errors(d);
 }
 
 /// The tables first, the basis after: its size depends on the longest window.

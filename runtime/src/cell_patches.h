@@ -19,10 +19,9 @@ namespace rill {
 
 struct CellPatches {
     uint8_t count = 0;               ///< patches, at most 4
-    uint8_t doubled_face = no_face;  ///< ambiguous face with both segments on one patch
+    uint8_t doubled = 0;             ///< bits of ambiguous faces with both segments on one patch
     uint8_t patch[12] = {};          ///< of each sign-changing edge
     uint16_t crossed = 0;            ///< which edges change sign
-    static constexpr uint8_t no_face = 6;
 };
 
 namespace patches_detail {
@@ -83,11 +82,11 @@ constexpr void join_face(Joined& joined, uint32_t inside, const Face& f, bool tu
     }
 }
 
-/// `turned_face`: the ambiguous face treated the other way, or no_face.
-constexpr CellPatches trace(uint32_t inside, uint32_t turned_face) {
+/// `turned`: bits of the faces whose ambiguity is treated the other way.
+constexpr CellPatches trace(uint32_t inside, uint32_t turned) {
     Joined joined;
     for (uint32_t e = 0; e < 12; ++e) joined.root[e] = e;
-    for (uint32_t f = 0; f < 6; ++f) join_face(joined, inside, face_of(f), f == turned_face);
+    for (uint32_t f = 0; f < 6; ++f) join_face(joined, inside, face_of(f), turned >> f & 1);
     CellPatches cell;
     uint32_t name[12] = {};
     for (uint32_t e = 0; e < 12; ++e) {
@@ -101,7 +100,7 @@ constexpr CellPatches trace(uint32_t inside, uint32_t turned_face) {
         if (!ambiguous(inside, face)) continue;
         bool doubled = true;
         for (uint32_t edge : face.edge) doubled = doubled && cell.patch[edge] == cell.patch[face.edge[0]];
-        if (doubled) cell.doubled_face = uint8_t(f);
+        if (doubled) cell.doubled = uint8_t(cell.doubled | 1u << f);
     }
     return cell;
 }
@@ -110,8 +109,8 @@ constexpr CellPatches trace(uint32_t inside, uint32_t turned_face) {
 constexpr std::array<CellPatches, 512> trace_all() {
     std::array<CellPatches, 512> table{};
     for (uint32_t inside = 0; inside < 256; ++inside) {
-        table[inside] = trace(inside, CellPatches::no_face);
-        table[256 + inside] = trace(inside, table[inside].doubled_face);
+        table[inside] = trace(inside, 0);
+        table[256 + inside] = trace(inside, table[inside].doubled);
     }
     return table;
 }
@@ -119,5 +118,23 @@ constexpr std::array<CellPatches, 512> trace_all() {
 }  // namespace patches_detail
 
 inline constexpr std::array<CellPatches, 512> cell_patches = patches_detail::trace_all();
+
+/// How a cell is divided: its signs, and bits of the faces that are turned. Fits 14 bits.
+struct CellPattern {
+    uint16_t bits;
+    uint32_t signs() const { return bits & 255; }
+    uint32_t turned() const { return uint32_t(bits) >> 8; }
+};
+constexpr CellPattern pattern_of(uint32_t signs, uint32_t turned) { return {uint16_t(signs | turned << 8)}; }
+/// From the table wherever cells are of one size; traced anew for the few on borders with others.
+inline CellPatches patches_of(CellPattern pattern) {
+    const uint32_t signs = pattern.signs(), turned = pattern.turned();
+    if (turned == 0) return cell_patches[signs];
+    if (turned == cell_patches[signs].doubled) return cell_patches[256 + signs];
+    return patches_detail::trace(signs, turned);
+}
+inline uint32_t patch_of(CellPattern pattern, uint32_t edge) {
+    return pattern.turned() ? patches_of(pattern).patch[edge] : cell_patches[pattern.signs()].patch[edge];
+}
 
 }  // namespace rill

@@ -19,24 +19,49 @@ uint32_t corner_signs(const Tile& tile, uint32_t cell) {
     return pair(row) | pair(row + 1) << 2 | pair(row + 9) << 4 | pair(row + 10) << 6;
 }
 
-/// Row of cell_patches for a surface cell: the doubled face is turned when it is doubled from both sides.
-uint32_t patches_of(const Mesher& m, const Tile& tile, uint32_t cell) {
-    const uint32_t signs = corner_signs(tile, cell), face = cell_patches[signs].doubled_face;
-    if (face == CellPatches::no_face) return signs;
-    int32_t at[3] = {int32_t(cell % 8), int32_t(cell / 8 % 8), int32_t(cell / 64)}, coord[3];
-    std::memcpy(coord, tile.coord, sizeof(coord));
-    at[face / 2] += face & 1 ? 1 : -1;
+/// Faces of a cell that its smaller neighbours have turned.
+uint32_t turned_faces(const Tile& tile, uint32_t cell) {
+    if (!(tile.beside & every_finer)) return 0;
+    const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    uint32_t turned = 0;
+    for (uint32_t face = 0; face < 6; ++face) {
+        const uint32_t axis = face / 2, i = at[axis == 0 ? 1 : 0], j = at[axis == 2 ? 1 : 2];
+        if (at[axis] == (face & 1 ? 7u : 0u)) turned |= uint32_t(tile.turned[face] >> (i + 8 * j) & 1) << face;
+    }
+    return turned;
+}
+
+CellPattern plain_pattern(const Tile& tile, uint32_t cell) {
+    return pattern_of(corner_signs(tile, cell), turned_faces(tile, cell));
+}
+
+/// Whether the cell beyond a face is of the same size and has that face doubled, too.
+bool doubled_beyond(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t face) {
+    int32_t at[3] = {int32_t(cell % 8), int32_t(cell / 8 % 8), int32_t(cell / 64)}, side[3] = {};
+    side[face / 2] = face & 1 ? 1 : -1;
+    at[face / 2] += side[face / 2];
     const Tile* beyond = &tile;
     if (at[face / 2] < 0 || at[face / 2] >= tile_cells) {
-        coord[face / 2] += face & 1 ? 1 : -1;
+        if (tile.at_place(place_of(side[0], side[1], side[2])) != beside_same) return false;
+        const int32_t coord[3] = {tile.coord[0] + side[0], tile.coord[1] + side[1], tile.coord[2] + side[2]};
         at[face / 2] &= tile_cells - 1;
-        const uint32_t index = find_tile(m, coord);
-        if (index == no_tile) return signs;
+        const uint32_t index = find_tile(m, tile.level, coord);
+        if (index == no_tile) return false;
         beyond = &m.tiles[index];
     }
-    if (!(beyond->surface[at[1] + 8 * at[2]] >> at[0] & 1)) return signs;
-    const uint32_t other = corner_signs(*beyond, uint32_t(at[0] + 8 * (at[1] + 8 * at[2])));
-    return cell_patches[other].doubled_face == (face ^ 1u) ? signs + 256 : signs;
+    if (!(beyond->surface[at[1] + 8 * at[2]] >> at[0] & 1)) return false;
+    const CellPattern other = plain_pattern(*beyond, uint32_t(at[0] + 8 * (at[1] + 8 * at[2])));
+    return patches_of(other).doubled >> (face ^ 1u) & 1;
+}
+
+/// The pattern of a surface cell: a face between cells of one size is turned when it is doubled from both sides.
+CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
+    const CellPattern plain = plain_pattern(tile, cell);
+    const uint32_t doubled = plain.turned() ? patches_of(plain).doubled : cell_patches[plain.signs()].doubled;
+    uint32_t turned = plain.turned();
+    for (uint32_t face = 0; doubled >> face; ++face)
+        if (doubled >> face & 1 && doubled_beyond(m, tile, cell, face)) turned |= 1u << face;
+    return pattern_of(plain.signs(), turned);
 }
 
 /// Block by block of 4³: vertices next to each other share what they are evaluated from.
@@ -72,8 +97,7 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
 }
 
 /// Appends the patches of a cell to the batch: mean of their crossings.
-void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t cell,
-                   const CellPatches& patches, uint32_t& n) {
+void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
     const float* value = corner_values(tile, cell);
     float sum[4][3] = {}, crossings[4] = {};
     for_bits(patches.crossed, [&](uint32_t e) {
@@ -90,7 +114,7 @@ void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
         const float share = 1 / crossings[p];
         for (uint32_t a = 0; a < 3; ++a) {
             const float inside = std::clamp(sum[p][a] * share, cell_margin, 1 - cell_margin);
-            *out[a] = (float(tile_cells * tile.coord[a] + int32_t(at[a])) + inside) * m.input.cell_size;
+            *out[a] = (float(tile_cells * tile.coord[a] + int32_t(at[a])) + inside) * tile.cell;
         }
         s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(p);
     }
@@ -98,7 +122,7 @@ void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
 
 /// A normal from the corners' signs, for where the field has none.
 void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t patch, float normal[3]) {
-    const CellPatches& patches = cell_patches[patches_of(m, tile, cell)];
+    const CellPatches patches = patches_of(pattern_at(m, tile, cell));
     const float* value = corner_values(tile, cell);
     for (int a = 0; a < 3; ++a) normal[a] = 0;
     for_bits(patches.crossed, [&](uint32_t e) {
@@ -108,8 +132,8 @@ void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t pat
 }
 
 /// One step onto the field, inside the cell. `i`: place in the batch.
-void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
-    const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = m.input.cell_size;
+void step(MesherScratch& s, const Tile& tile, uint32_t i) {
+    const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = tile.cell;
     const float k = s.value[i] / g2;
     if (!(k * k * g2 < size * size)) return;  // farther than a cell, or no field: stay
     const uint32_t cell = s.cell[s.slot[i]], at[3] = {cell % 8, cell / 8 % 8, cell / 64};
@@ -136,7 +160,7 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
                                    batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
                                    velocity);
         for (uint32_t i = first; i < first + batch; ++i) {
-            step(m, s, tile, i);
+            step(s, tile, i);
             const uint32_t slot = s.slot[i], vertex = first_vertex + slot;
             const float p[3] = {s.x[i], s.y[i], s.z[i]};
             float normal[3] = {s.gx[i], s.gy[i], s.gz[i]};
@@ -163,18 +187,18 @@ void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
     uint32_t n = 0, done = 0;
     list_candidates(m, s, tile);
     for_surface_cells(tile, [&](uint32_t cell) {
-        const uint32_t row = patches_of(m, tile, cell);
-        s.patches[cell] = uint16_t(row), s.vertex[cell] = uint16_t(done + n);
+        const CellPattern pattern = pattern_at(m, tile, cell);
+        s.pattern[cell] = pattern, s.vertex[cell] = uint16_t(done + n);
         if (n + 4 > MesherScratch::capacity) {
             finish_batch(m, s, tile, n, tile.first_vertex + done);
             done += n, n = 0;
         }
-        place_patches(m, s, tile, cell, cell_patches[row], n);
+        place_patches(s, tile, cell, patches_of(pattern), n);
     });
     finish_batch(m, s, tile, n, tile.first_vertex + done);
     // The corner values are used up; what the quads need takes their place.
     for_surface_cells(tile, [&](uint32_t cell) {
-        tile.placed.vertex[cell] = s.vertex[cell], tile.placed.patches[cell] = s.patches[cell];
+        tile.placed.vertex[cell] = s.vertex[cell], tile.placed.pattern[cell] = s.pattern[cell];
     });
 }
 
@@ -192,14 +216,13 @@ void run_counts(void* mesher, uint32_t task, uint32_t) {
         Tile& tile = m.tiles[m.order[i].tile];
         tile.vertex_count = 0;
         for_surface_cells(
-            tile, [&](uint32_t cell) { tile.vertex_count += cell_patches[patches_of(m, tile, cell)].count; });
+            tile, [&](uint32_t cell) { tile.vertex_count += patches_of(pattern_at(m, tile, cell)).count; });
         tile.index_count = count_indices(m, tile);
     });
 }
 
 uint32_t prepare_vertices(void* mesher) {
     Mesher& m = *static_cast<Mesher*>(mesher);
-    lay_out(m);
     return tasks_of(m.kept, tiles_per_march_task);
 }
 

@@ -98,6 +98,16 @@ void hand_out_points(const format::PointSet& points, uint32_t first, uint32_t la
     }
 }
 
+/// Fits and fields cost by the point: those so far out of sight that they touch nothing in it are left out.
+void cull_points(const Plan& plan, float margin, format::PointSet& points) {
+    for (uint32_t i = 0; i < points.count; ++i) {
+        const float p[3] = {points.x[i], points.y[i], points.z[i]};
+        bool seen = plan.view_count == 0;
+        for (uint32_t v = 0; v < plan.view_count && !seen; ++v) seen = touches(plan.views[v], p, p, margin);
+        if (!seen) points.activity[i] = 0;
+    }
+}
+
 void run_evaluate(void* context, uint32_t index, uint32_t) {
     auto& player = *static_cast<Player*>(context);
     Evaluation& e = player.evaluation;
@@ -112,6 +122,8 @@ void run_evaluate(void* context, uint32_t index, uint32_t) {
     } else {
         points = slice(e.points, piece.offset);
         evaluate_tracks(e.rows, block, piece.first, piece.last, piece.room, 0, points, drops);
+        const format::ChunkRecord& record = player.directory->tables.chunks[piece.chunk];
+        cull_points(player.plan, (reach_in_spacings + 1) * record.spacing, points);
         hand_out_points(e.points, piece.offset, piece.offset + piece.room, *player.frame.target);
     }
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Surface cells without specks: pieces of one corner or two, or of a few that fewer than three points stand by. They are
 // what the field means where patches of sharp rims end, not liquid: a violent splash had 15 in a frame, of 12 to 50
-// triangles. The march has visited all cells round a piece, so that its neighbours are known.
+// triangles. The march has visited all cells round a piece, so that its neighbours are known. Corners that tiles of
+// different size share stay as they are: those see other neighbours.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -21,9 +22,21 @@ struct Place {
     bool before(const Place& o) const { return z != o.z ? z < o.z : y != o.y ? y < o.y : x < o.x; }
 };
 
+/// One of the tiles that hold the corner has cells of another size.
+bool on_mixed_border(const Tile& tile, int x, int y, int z) {
+    if (!tile.beside) return false;
+    const auto first = [](int at) { return at == 0 ? -1 : 0; };
+    const auto last = [](int at) { return at == tile_cells ? 1 : 0; };
+    for (int k = first(z); k <= last(z); ++k)
+        for (int j = first(y); j <= last(y); ++j)
+            for (int i = first(x); i <= last(x); ++i)
+                if (tile.at_place(place_of(i, j, k)) != beside_same) return true;
+    return false;
+}
+
 Sign sign_of(const Tile& tile, int x, int y, int z) {
     const uint32_t row = uint32_t(y + 9 * z);
-    if (!(tile.known[row] >> x & 1)) return Sign::unknown;
+    if (!(tile.known[row] >> x & 1) || on_mixed_border(tile, x, y, z)) return Sign::unknown;
     return tile.inside[row] >> x & 1 ? Sign::inside : Sign::outside;
 }
 Sign sign_at(const Mesher& m, const Tile& tile, const Place& at) {
@@ -37,7 +50,7 @@ Sign sign_at(const Mesher& m, const Tile& tile, const Place& at) {
         beyond = beyond || away;
     }
     if (!beyond) return sign_of(tile, at.x, at.y, at.z);
-    const uint32_t index = find_tile(m, coord);
+    const uint32_t index = find_tile(m, tile.level, coord);
     return index == no_tile ? Sign::unknown : sign_of(m.tiles[index], place[0], place[1], place[2]);
 }
 
@@ -51,6 +64,7 @@ struct Piece {
 /// The piece whose first corner is `first`; false when that is not its first, when it is large, or not all known.
 bool collect(const Mesher& m, const Tile& tile, const Place& first, Piece& piece) {
     const Sign sign = sign_at(m, tile, first);
+    if (sign == Sign::unknown) return false;
     piece.corner[0] = first, piece.count = 1;
     for (uint32_t k = 0; k < piece.count; ++k)
         for (int side = 0; side < 6; ++side) {
@@ -76,8 +90,8 @@ uint32_t count_points(const Mesher& m, MesherScratch& s, const Tile& tile, const
     }
     surface::Box box;
     for (int a = 0; a < 3; ++a) {
-        box.lower[a] = float(tile_cells * tile.coord[a] + lower[a] - 1) * m.input.cell_size;
-        box.upper[a] = float(tile_cells * tile.coord[a] + upper[a] + 1) * m.input.cell_size;
+        box.lower[a] = float(tile_cells * tile.coord[a] + lower[a] - 1) * tile.cell;
+        box.upper[a] = float(tile_cells * tile.coord[a] + upper[a] + 1) * tile.cell;
     }
     const surface::Field& f = *m.input.field;
     const uint32_t found = std::min(m.access.gather(f, box, s.candidates, s.most_candidates), s.most_candidates);
@@ -86,7 +100,7 @@ uint32_t count_points(const Mesher& m, MesherScratch& s, const Tile& tile, const
         const uint32_t j = s.candidates[c];
         if (j >= f.point_count) return enough_points;  // a drop is what it is
         const auto cell = [&](float x, int a) {
-            const float c = std::floor(x / m.input.cell_size) - float(tile_cells * tile.coord[a]);
+            const float c = std::floor(x / tile.cell) - float(tile_cells * tile.coord[a]);
             return int(std::clamp(c, -100.f, 100.f));
         };
         const int x = cell(f.x[j], 0), y = cell(f.y[j], 1), z = cell(f.z[j], 2);
@@ -134,13 +148,13 @@ void turn_corner(Mesher& m, const Tile& tile, const Place& at) {
             place[a] = global - tile_cells * coord[a];
             held = held && place[a] <= tile_cells;
         }
-        const uint32_t index = held ? find_tile(m, coord) : no_tile;
+        const uint32_t index = held ? find_tile(m, tile.level, coord) : no_tile;
         if (index == no_tile) continue;
         Tile& holder = m.tiles[index];
         const int row = place[1] + 9 * place[2];
         holder.inside[row] ^= uint16_t(1 << place[0]);
         holder.value[place[0] + 9 * row] *= -1;
-        for (uint32_t r = 0; r < rows_per_tile; ++r) holder.surface[r] = holder.visited[r] & surface_cells(holder, r);
+        for (uint32_t r = 0; r < rows_per_tile; ++r) holder.surface[r] &= surface_cells(holder, r);
     }
 }
 

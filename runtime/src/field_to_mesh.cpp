@@ -67,25 +67,86 @@ Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept {
     return m;
 }
 
+namespace {
+
+void start_attempt(Mesher& m) {
+    m.tile_count = m.order_count = m.kept = 0;
+    m.active_count = m.next_active_count = m.colour = 0;
+    m.tiles_ran_out = false, m.seeding = true;
+    m.phase = MeshPhase::march;
+    std::memset(m.hash, 0, (size_t(m.hash_mask) + 1) * sizeof(uint32_t));
+}
+
+/// False: no more detail may be given up.
+bool start_coarser(Mesher& m, float octaves) {
+    const float more = std::min(octaves, m.input.most_octaves - m.octaves);
+    if (!(more > 0)) return false;
+    m.octaves += more;
+    m.input.levels.coarsen(more);
+    start_attempt(m);
+    return true;
+}
+
+/// Runs what is serial until there are tasks, or all is done.
+uint32_t prepare_mesh(void* mesher) {
+    constexpr float octaves_when_late = 1;
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    for (;;) {
+        uint32_t tasks = 0;
+        switch (m.phase) {
+            case MeshPhase::march:
+                if (m.input.late && m.input.late(m.input.user) && start_coarser(m, octaves_when_late))
+                    m.cut |= cut_time;
+                tasks = prepare_march(mesher), m.run = run_march;
+                if (!tasks) m.phase = MeshPhase::find_specks;
+                break;
+            case MeshPhase::find_specks:
+                tasks = prepare_find_specks(mesher), m.run = run_find_specks;
+                m.phase = MeshPhase::turn_specks;
+                break;
+            case MeshPhase::turn_specks:
+                prepare_turn_specks(mesher);
+                m.phase = MeshPhase::counts;
+                break;
+            case MeshPhase::counts:
+                tasks = prepare_counts(mesher), m.run = run_counts;
+                m.phase = MeshPhase::vertices;
+                break;
+            case MeshPhase::vertices:
+                m.phase = MeshPhase::quads;
+                lay_out(m);
+                if (m.too_large > 0 && start_coarser(m, m.too_large)) break;
+                tasks = prepare_vertices(mesher), m.run = run_vertices;
+                break;
+            case MeshPhase::quads:
+                tasks = prepare_quads(mesher), m.run = run_quads;
+                m.phase = MeshPhase::ranges;
+                break;
+            case MeshPhase::ranges:
+                prepare_ranges(mesher);
+                m.phase = MeshPhase::done;
+                break;
+            case MeshPhase::done: return 0;
+        }
+        if (tasks) return tasks;
+    }
+}
+
+void run_mesh(void* mesher, uint32_t task, uint32_t worker) { static_cast<Mesher*>(mesher)->run(mesher, task, worker); }
+
+}  // namespace
+
 void begin_mesh(Mesher* m, const MeshInput& input) noexcept {
     m->input = input;
-    m->inverse_tile = 1 / (tile_cells * input.cell_size);
     m->cut = m->vertices_wanted = m->indices_wanted = m->ranges_wanted = 0;
-    m->tile_count = m->order_count = m->kept = 0;
-    m->active_count = m->next_active_count = m->colour = 0;
-    m->tiles_ran_out = false, m->seeding = true;
-    std::memset(m->hash, 0, (size_t(m->hash_mask) + 1) * sizeof(uint32_t));
+    m->octaves = 0;
     for (uint32_t w = 0; w < m->limits.workers; ++w) m->scratch[w].corners_evaluated = 0;
+    start_attempt(*m);
 }
 
 const Stage* mesh_stages(uint32_t* count) noexcept {
-    static constexpr Stage stages[] = {
-        {prepare_march, run_march, true},        {prepare_find_specks, run_find_specks, false},
-        {prepare_turn_specks, nullptr, false}, {prepare_counts, run_counts, false},
-        {prepare_vertices, run_vertices, false}, {prepare_quads, run_quads, false},
-        {prepare_ranges, nullptr, false},
-    };
-    *count = uint32_t(sizeof(stages) / sizeof(stages[0]));
+    static constexpr Stage stages[] = {{prepare_mesh, run_mesh, true}};
+    *count = 1;
     return stages;
 }
 
@@ -93,7 +154,7 @@ MeshCounts mesh_counts(const Mesher* m) noexcept {
     uint64_t corners = 0;
     for (uint32_t w = 0; w < m->limits.workers; ++w) corners += m->scratch[w].corners_evaluated;
     return {m->cut, m->vertices_wanted, m->indices_wanted, m->ranges_wanted,
-            uint32_t(std::min<uint64_t>(corners, ~0u))};
+            uint32_t(std::min<uint64_t>(corners, ~0u)), m->vertices_found, m->octaves};
 }
 
 }  // namespace rill

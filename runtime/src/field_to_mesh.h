@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "levels.h"
 #include "relay.h"
 #include "rill/rill.h"
 #include "surface/field.h"
@@ -22,16 +23,23 @@ struct FrustumPlanes {
 };
 struct MeshInput {
     const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares
-    float cell_size;              ///< asset space
+    Levels levels;                ///< sizes of cells
     const FrustumPlanes* views;   ///< none: everything
     uint32_t view_count;
     bool velocity;                ///< wanted in the output
     Target* target;               ///< may be null: mesh but write nothing
+    /// What does not fit is meshed again with larger cells, up to so many octaves, before anything is cut off.
+    float most_octaves = 0;
+    /// May be null. Asked between rounds; true: what has been found so far takes too long already.
+    bool (*late)(void* user) = nullptr;
+    void* user = nullptr;
 };
 struct MeshCounts {
     uint32_t cut;                 ///< Cut bits
-    uint32_t vertices_wanted, indices_wanted;  ///< when tiles ran out: twice MeshLimits::vertices at least
+    uint32_t vertices_wanted, indices_wanted;  ///< as asked; when tiles ran out: twice MeshLimits::vertices at least
     uint32_t ranges_wanted, corners_evaluated;
+    uint32_t vertices;            ///< of what was meshed in the end
+    float octaves;                ///< coarser than asked
 };
 struct Mesher;  ///< lives in the memory given
 

@@ -50,7 +50,7 @@ void count_output(Player& player, Stats& stats) {
     const Evaluation& e = player.evaluation;
     const MeshCounts mesh = mesh_counts(player.mesher);
     stats.points_wanted = e.points_wanted;
-    stats.points_used = e.points.count + e.drops.count;
+    stats.points_used = player.field.point_count + player.field.drop_count;
     stats.vertices_wanted = mesh.vertices_wanted;
     stats.indices_wanted = mesh.indices_wanted;
     stats.cut |= mesh.cut | (e.cut ? uint32_t(cut_points) : 0u);
@@ -58,14 +58,8 @@ void count_output(Player& player, Stats& stats) {
     target->points_used = points ? std::min(e.points.count, target->point_capacity) : 0;
 }
 
-/// Too slow: one level coarser from the next frame on. Twice as fast as needed: one finer (a level
-/// costs about four times the work, hence the wide gap).
 void count_time(Player& player, Stats& stats) {
-    const uint32_t cap = player.frame.budget.microseconds;
-    if (!cap) {
-        player.coarser = 0;
-        return;
-    }
+    if (!player.frame.budget.microseconds) return;
     stats.plan_us = player.plan_us;
     stats.wait_us = player.wait_us;
     stats.decode_us = uint32_t(player.decode_done.us - player.decode_begun.us);
@@ -73,11 +67,15 @@ void count_time(Player& player, Stats& stats) {
         stats.field_us = uint32_t(player.mesh_begun.us - player.decode_done.us);
         stats.mesh_us = uint32_t(player.mesh_done.us - player.mesh_begun.us);
     }
-    if (player.coarser) stats.cut |= cut_time;
-    constexpr uint32_t most_coarser = 4;
-    const uint64_t spent = player.plan_us + (player.mesh_done.us - player.decode_begun.us);
-    if (spent > cap && player.coarser < most_coarser) ++player.coarser;
-    else if (spent * 6 < cap && player.coarser) --player.coarser;
+    if (player.pace.octaves > 0) stats.cut |= cut_time;
+}
+
+/// Of what is drawn, with all that was given up.
+void count_detail(const Player& player, Stats& stats) {
+    Levels levels = player.plan.levels_drawn;
+    if (player.frame.target) levels.coarsen(mesh_counts(player.mesher).octaves);
+    stats.cell_size = smallest_cell(*player.directory, player.plan, levels);
+    stats.pixel_error = stats.cell_size * player.plan.detail.pixels_per_metre;
 }
 
 }  // namespace
@@ -86,12 +84,12 @@ Stats count_all(Player& player) noexcept {
     Stats stats{};
     stats.blocks_in_view = player.plan.blocks_in_view;
     stats.layers_wanted = player.plan.detail.layers;
-    stats.cell_size = player.plan.detail.cell_size;
-    stats.pixel_error = player.plan.detail.pixel_error;
+    count_detail(player, stats);
     count_drawn(player, stats);
     count_residency(player, stats);
     count_output(player, stats);
     count_time(player, stats);
+    learn_pace(player, mesh_counts(player.mesher), player.residency.decode_bytes);
     return stats;
 }
 

@@ -14,38 +14,58 @@ namespace {
 constexpr float disc_share = 0.25f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
-int32_t tile_at(const Mesher& m, float x) {
-    const float t = std::floor(x * m.inverse_tile);
-    return t > -2e6f && t < 2e6f ? int32_t(t) : farthest_tile;
+void want(Tile& tile, const int cell[3]) {
+    const int row = cell[1] + 8 * cell[2];
+    tile.pending[row] |= uint8_t(1 << cell[0] & ~tile.visited[row]);
 }
 
-void want(Tile& tile, const int cell[3]) { tile.pending[cell[1] + 8 * cell[2]] |= uint8_t(1 << cell[0]); }
-
-/// Tiles that the disc of point i may cross.
+/// Tiles that the disc of a point may cross.
+struct SeedDisc {
+    const float *p, *n;
+    int32_t level, home[3];
+};
+void seed_box(Mesher& m, const SeedDisc& disc, int32_t level, const int32_t c[3]) {
+    const Levels& levels = m.input.levels;
+    const float size = tile_cells * levels.cell(level);
+    float height = 0, reach = 0;
+    for (int a = 0; a < 3; ++a) {
+        height += disc.n[a] * ((float(c[a]) + 0.5f) * size - disc.p[a]);
+        reach += 0.5f * size * std::abs(disc.n[a]);
+    }
+    const bool is_home = level == disc.level && std::equal(c, c + 3, disc.home);
+    if (std::abs(height) > reach && !is_home) return;
+    if (levels.divided(level, c)) {
+        for (int k = 0; k < 8; ++k) {
+            const int32_t child[3] = {2 * c[0] + (k & 1), 2 * c[1] + (k >> 1 & 1), 2 * c[2] + (k >> 2)};
+            seed_box(m, disc, level - 1, child);
+        }
+        return;
+    }
+    int32_t box[3] = {c[0], c[1], c[2]}, above[3];
+    for (; level < levels.coarsest(); ++level) {
+        parent_of(box, above);
+        if (levels.divided(level + 1, above)) break;
+        std::copy(above, above + 3, box);
+    }
+    const uint32_t tile = find_or_create_tile(m, level, box);
+    if (tile != no_tile) queue_tile(m, tile);
+}
 void seed_point(Mesher& m, uint32_t i) {
     const surface::Field& f = *m.input.field;
     const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
-    const float radius = disc_share * f.support[i], size = tile_cells * m.input.cell_size;
-    int32_t from[3], to[3], home[3];
+    SeedDisc disc{p, n, 0, {}};
+    if (!leaf_at(m, p, disc.level, disc.home)) return;
+    const float radius = disc_share * f.support[i], inverse = 1 / (tile_cells * m.input.levels.cell(disc.level));
+    int32_t from[3], to[3];
     for (int a = 0; a < 3; ++a) {
-        home[a] = tile_at(m, p[a]);
-        if (home[a] == farthest_tile) return;
-        const float extent = radius * std::sqrt(std::max(0.f, 1 - n[a] * n[a]));
-        from[a] = std::max(tile_at(m, p[a] - extent), home[a] - most_seed_tiles);
-        to[a] = std::min(tile_at(m, p[a] + extent), home[a] + most_seed_tiles);
+        const float extent = radius * std::sqrt(std::max(0.f, 1 - n[a] * n[a])) * inverse, at = p[a] * inverse;
+        from[a] = disc.home[a] + int32_t(std::max(std::floor(at - extent) - std::floor(at), -float(most_seed_tiles)));
+        to[a] = disc.home[a] + int32_t(std::min(std::floor(at + extent) - std::floor(at), float(most_seed_tiles)));
     }
-    const float reach = 0.5f * size * (std::abs(n[0]) + std::abs(n[1]) + std::abs(n[2]));
     int32_t c[3];
     for (c[2] = from[2]; c[2] <= to[2]; ++c[2])
         for (c[1] = from[1]; c[1] <= to[1]; ++c[1])
-            for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) {
-                float height = 0;
-                for (int a = 0; a < 3; ++a) height += n[a] * ((float(c[a]) + 0.5f) * size - p[a]);
-                const bool is_home = c[0] == home[0] && c[1] == home[1] && c[2] == home[2];
-                if (std::abs(height) > reach && !is_home) continue;
-                const uint32_t tile = find_or_create_tile(m, c);
-                if (tile != no_tile) queue_tile(m, tile);
-            }
+            for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) seed_box(m, disc, disc.level, c);
 }
 
 /// The cells where the six half axes leave the ellipsoid; it is convex, so the march finds the rest.
@@ -57,14 +77,14 @@ void seed_drop(Mesher& m, uint32_t i) {
         for (int k : row[a / 2]) length2 += f.inverse[k][i] * f.inverse[k][i];
         if (!(length2 > 0)) continue;
         p[a / 2] += (a & 1 ? 1.f : -1.f) / std::sqrt(length2);
-        int32_t tile_coord[3];
+        int32_t level, tile_coord[3];
+        if (!leaf_at(m, p, level, tile_coord)) continue;
         int cell[3];
         for (int b = 0; b < 3; ++b) {
-            tile_coord[b] = tile_at(m, p[b]);
-            cell[b] = int32_t(std::floor(p[b] / m.input.cell_size)) - tile_cells * tile_coord[b];
+            cell[b] = int32_t(std::floor(p[b] / m.input.levels.cell(level))) - tile_cells * tile_coord[b];
             cell[b] = std::clamp(cell[b], 0, tile_cells - 1);
         }
-        const uint32_t tile = find_or_create_tile(m, tile_coord);
+        const uint32_t tile = find_or_create_tile(m, level, tile_coord);
         if (tile == no_tile) continue;
         want(m.tiles[tile], cell);
         queue_tile(m, tile);
@@ -76,7 +96,7 @@ void seed_drop(Mesher& m, uint32_t i) {
 void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const surface::Field& f = *m.input.field;
     const surface::Patch& q = f.patches[i];
-    const float cells = tile_cells * m.inverse_tile, radius = disc_share * f.support[i] * cells + 0.5f;
+    const float cells = 1 / tile.cell, radius = disc_share * f.support[i] * cells + 0.5f;
     const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
     float at[3];  // in cells of this tile
     for (int a = 0; a < 3; ++a) {
@@ -95,7 +115,7 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
                                                      : (std::abs(n[1]) > std::abs(n[2]) ? 1 : 2);
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    const float slope_u = -n[u] / n[axis], slope_v = -n[v] / n[axis], bend = -m.input.cell_size / n[axis];
+    const float slope_u = -n[u] / n[axis], slope_v = -n[v] / n[axis], bend = -tile.cell / n[axis];
     const float half = 0.5f * (std::abs(slope_u) + std::abs(slope_v));
     float r[3];
     int cell[3];
@@ -128,9 +148,12 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
             need[row] |= corners, need[row + 1] |= corners, need[row + 9] |= corners,
                 need[row + 10] |= corners;
         }
+    uint16_t hanging[81] = {};
+    const bool mixed = (tile.beside & every_coarser) != 0;
+    if (mixed) find_hanging(tile, hanging), need_parents(hanging, need);
     float place[3][tile_corners];
     for (uint32_t a = 0; a < 3; ++a)
-        for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(m, tile, a, k);
+        for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(tile, a, k);
     uint32_t n = 0;
     // Octant by octant, so that batches are compact.
     for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -139,7 +162,7 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
         for (uint32_t z = from_z; z < to_z; ++z)
             for (uint32_t y = from_y; y < to_y; ++y) {
                 const uint32_t row = y + 9 * z;
-                uint32_t bits = need[row] & ~uint32_t(tile.known[row]) & (octant & 1 ? 0x1e0 : 0x01f);
+                uint32_t bits = need[row] & ~uint32_t(tile.known[row] | hanging[row]) & (octant & 1 ? 0x1e0 : 0x01f);
                 tile.known[row] |= uint16_t(bits);
                 const float py = place[1][y], pz = place[2][z];
                 for_bits(bits, [&](uint32_t x) {
@@ -154,10 +177,11 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
     });
     for (uint32_t i = 0; i < n; ++i) {
         // Where nothing is known there is air; this also catches what is not a number.
-        const float value = std::abs(s.value[i]) < surface::unsupported ? s.value[i] : m.input.cell_size;
+        const float value = std::abs(s.value[i]) < surface::unsupported ? s.value[i] : tile.cell;
         tile.value[s.slot[i]] = value;
         tile.inside[s.slot[i] / 9] |= uint16_t(uint32_t(value < 0) << (s.slot[i] % 9));
     }
+    if (mixed) settle_hanging(tile, hanging, need);
 }
 
 /// Takes over the corners that neighbours have evaluated already. Rounds alternate between the two colours
@@ -166,7 +190,7 @@ void borrow_corners(const Mesher& m, Tile& tile) {
     for (uint32_t face = 0; face < 6; ++face) {
         int32_t coord[3] = {tile.coord[0], tile.coord[1], tile.coord[2]};
         coord[face / 2] += face & 1 ? 1 : -1;
-        const uint32_t index = find_tile(m, coord);
+        const uint32_t index = find_tile(m, tile.level, coord);
         if (index == no_tile) continue;
         const Tile& from = m.tiles[index];
         constexpr uint32_t step[3] = {1, 9, 81};
@@ -218,31 +242,72 @@ bool has_pending(const Tile& tile) {
     return std::any_of(tile.pending, tile.pending + rows_per_tile, [](uint8_t r) { return r != 0; });
 }
 
+/// Where cells beyond a face are asked for: `axis` points out of it, `up` or down.
+struct Crossing {
+    uint32_t axis, u, v;  ///< u < v: along the face; bit i + 8 j of the wanted is cell (i, j) there
+    bool up;
+};
+
+/// True when the cell was not visited yet.
+bool ask_cell(Tile& tile, const Crossing& c, uint32_t i, uint32_t j) {
+    int cell[3];
+    cell[c.axis] = c.up ? 0 : tile_cells - 1;  // the neighbour's layer next to us
+    cell[c.u] = int(i), cell[c.v] = int(j);
+    if (tile.visited[cell[1] + 8 * cell[2]] >> cell[0] & 1) return false;
+    want(tile, cell);
+    return true;
+}
+
+template <typename Work>
+void for_wanted(uint64_t wanted, Work work) {
+    for (uint32_t bit = 0; wanted; ++bit, wanted >>= 1)
+        if (wanted & 1) work(bit % 8, bit / 8);
+}
+
+void ask_same(Mesher& m, int32_t level, const int32_t there[3], const Crossing& c, uint64_t wanted) {
+    const uint32_t neighbour = find_or_create_tile(m, level, there);
+    if (neighbour == no_tile) return;
+    bool more = false;
+    for_wanted(wanted, [&](uint32_t i, uint32_t j) { more |= ask_cell(m.tiles[neighbour], c, i, j); });
+    if (more) queue_tile(m, neighbour);
+}
+
+/// Four of our cells border on one of the larger.
+void ask_coarser(Mesher& m, int32_t level, const int32_t there[3], const Crossing& c, uint64_t wanted) {
+    int32_t parent[3];
+    parent_of(there, parent);
+    const uint32_t from_u = 4 * uint32_t(there[c.u] & 1), from_v = 4 * uint32_t(there[c.v] & 1);
+    uint64_t larger = 0;
+    for_wanted(wanted, [&](uint32_t i, uint32_t j) { larger |= uint64_t(1) << (from_u + i / 2 + 8 * (from_v + j / 2)); });
+    ask_same(m, level + 1, parent, c, larger);
+}
+
+/// One of our cells borders on four of the smaller, and the face on four tiles of theirs.
+void ask_finer(Mesher& m, int32_t level, const int32_t there[3], const Crossing& c, uint64_t wanted) {
+    for (uint32_t k = 0; k < 4; ++k) {
+        int32_t child[3] = {2 * there[0], 2 * there[1], 2 * there[2]};
+        child[c.axis] += !c.up, child[c.u] += int32_t(k & 1), child[c.v] += int32_t(k >> 1);
+        uint64_t smaller = 0;
+        for_wanted(wanted, [&](uint32_t i, uint32_t j) {
+            if (i / 4 == (k & 1) && j / 4 == k >> 1) smaller |= uint64_t(0x303) << (2 * (i % 4) + 16 * (j % 4));
+        });
+        if (smaller) ask_same(m, level - 1, child, c, smaller);
+    }
+}
+
 /// Hands the cells wanted beyond each face to the neighbours; makes them where they are missing.
 void exchange(Mesher& m, uint32_t index) {
     for (uint32_t face = 0; face < 6; ++face) {
         const uint64_t wanted = m.tiles[index].cross[face];
         if (!wanted) continue;
-        int32_t coord[3];
-        std::memcpy(coord, m.tiles[index].coord, sizeof(coord));
-        coord[face / 2] += face & 1 ? 1 : -1;
-        const uint32_t neighbour = find_or_create_tile(m, coord);
-        if (neighbour == no_tile) continue;
-        Tile& tile = m.tiles[neighbour];
-        const uint32_t entry = face & 1 ? 0 : 7;  // the neighbour's layer next to us
-        bool more = false;
-        const auto take = [&](uint32_t row, uint32_t bits) {
-            bits &= ~uint32_t(tile.visited[row]);
-            tile.pending[row] |= uint8_t(bits);
-            more = more || bits;
-        };
-        for (uint32_t k = 0; k < 8; ++k) {
-            const uint32_t bits = uint32_t(wanted >> (8 * k)) & 0xff;
-            if (face / 2 == 1) take(entry + 8 * k, bits);
-            if (face / 2 == 2) take(k + 8 * entry, bits);
-            for (uint32_t y = 0; face / 2 == 0 && y < 8; ++y) take(y + 8 * k, (bits >> y & 1) << entry);
-        }
-        if (more) queue_tile(m, neighbour);
+        const uint32_t axis = face / 2;
+        const Crossing crossing{axis, axis == 0 ? 1u : 0u, axis == 2 ? 1u : 2u, bool(face & 1)};
+        int32_t side[3] = {}, there[3];
+        side[axis] = crossing.up ? 1 : -1;
+        for (int a = 0; a < 3; ++a) there[a] = m.tiles[index].coord[a] + side[a];
+        const Beside kind = m.tiles[index].at_place(place_of(side[0], side[1], side[2]));
+        const auto ask = kind == beside_same ? ask_same : kind == beside_coarser ? ask_coarser : ask_finer;
+        ask(m, m.tiles[index].level, there, crossing, wanted);
     }
 }
 
@@ -263,7 +328,9 @@ void take_colour(Mesher& m) {
     }
 }
 
-bool usable(const MeshInput& input) { return input.field && input.cell_size > 0 && input.cell_size < 1e18f; }
+bool usable(const MeshInput& input) {
+    return input.field && input.levels.cell_size > 0 && input.levels.cell_size < 1e12f;
+}
 
 }  // namespace
 
@@ -296,6 +363,7 @@ void run_march(void* mesher, uint32_t task, uint32_t worker) {
             evaluate_corners(m, s, tile);
             visit(tile);
         }
+        if (tile.beside & every_finer) turn_border_faces(tile);
     });
 }
 

@@ -11,6 +11,15 @@
 namespace rill {
 namespace {
 
+struct Vector {
+    float x, y, z;
+};
+Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+float dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vector cross(const Vector& a, const Vector& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
 /// A tile and its lower neighbours: bit a of the index set = one tile down along axis a.
 struct Neighbourhood {
     const Tile* tile[8];
@@ -21,7 +30,7 @@ Neighbourhood neighbourhood(const Mesher& m, const Tile& tile) {
     for (int32_t k = 1; k < 8; ++k) {
         const int32_t coord[3] = {tile.coord[0] - (k & 1), tile.coord[1] - (k >> 1 & 1),
                                   tile.coord[2] - (k >> 2)};
-        const uint32_t index = find_tile(m, coord);
+        const uint32_t index = find_tile(m, tile.level, coord);
         n.tile[k] = index == no_tile ? nullptr : &m.tiles[index];
     }
     return n;
@@ -59,25 +68,7 @@ uint32_t vertex_at(const Neighbourhood& n, const int at[3], uint32_t edge) {
     const uint32_t k = (at[0] < 0 ? 1u : 0u) | (at[1] < 0 ? 2u : 0u) | (at[2] < 0 ? 4u : 0u);
     const Tile& tile = *n.tile[k];
     const uint32_t cell = uint32_t((at[0] & 7) + 8 * (at[1] & 7) + 64 * (at[2] & 7));
-    return tile.first_vertex + tile.placed.vertex[cell] + cell_patches[tile.placed.patches[cell]].patch[edge];
-}
-
-struct Vector {
-    float x, y, z;
-};
-Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-float dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vector cross(const Vector& a, const Vector& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
-/// Splits along 0–2 or 1–3: the shorter, unless only the other keeps both triangles facing one way.
-bool split_at_first(const Vector p[4]) {
-    const Vector a = p[2] - p[0], b = p[3] - p[1];
-    const float first = dot(cross(p[1] - p[0], a), cross(a, p[3] - p[0]));
-    const float second = dot(cross(p[2] - p[1], b), cross(b, p[0] - p[1]));
-    if ((first > 0) != (second > 0)) return first > 0;
-    return dot(a, a) <= dot(b, b);
+    return tile.first_vertex + tile.placed.vertex[cell] + patch_of(tile.placed.pattern[cell], edge);
 }
 
 struct TileWriter {
@@ -89,7 +80,6 @@ struct TileWriter {
     void quad(uint32_t axis, const int at[3], bool liquid_below) {
         const uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
         uint32_t index[4];
-        Vector p[4];
         // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below.
         constexpr int step_u[4] = {-1, 0, 0, -1}, step_v[4] = {-1, -1, 0, 0};
         for (uint32_t k = 0; k < 4; ++k) {
@@ -97,15 +87,10 @@ struct TileWriter {
             int cell[3] = {at[0], at[1], at[2]};
             cell[u] += step_u[from], cell[v] += step_v[from];
             index[k] = vertex_at(near, cell, 4 * axis + (step_u[from] ? 1 : 0) + (step_v[from] ? 2 : 0));
-            const float* q = m.position + 3 * size_t(index[k]);
-            p[k] = {q[0], q[1], q[2]};
-            for (uint32_t a = 0; a < 3; ++a) {
-                tile.lower[a] = std::min(tile.lower[a], q[a]);
-                tile.upper[a] = std::max(tile.upper[a], q[a]);
-            }
+            cover(tile, m.position + 3 * size_t(index[k]));
         }
         if (!out) return;
-        const uint32_t s = split_at_first(p) ? 0 : 1;
+        const uint32_t s = shorter_first(m, index) ? 0 : 1;
         const uint32_t six[6] = {index[s], index[s + 1], index[s + 2],
                                  index[s], index[s + 2], index[(s + 3) & 3]};
         std::memcpy(out, six, sizeof(six));
@@ -116,8 +101,12 @@ struct TileWriter {
 void write_tile(const Mesher& m, Tile& tile) {
     const Target* target = m.input.target;
     uint32_t* out = target && target->indices ? target->indices + tile.first_index : nullptr;
-    TileWriter writer{m, tile, neighbourhood(m, tile), out};
     for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
+    if (tile.beside) {
+        join_mixed(m, tile, out, true);
+        return;
+    }
+    TileWriter writer{m, tile, neighbourhood(m, tile), out};
     for (int z = 0; z < tile_cells; ++z)
         for (int y = 0; y < tile_cells; ++y) {
             const QuadMasks quads = quads_of_row(writer.near, y, z);
@@ -131,12 +120,34 @@ void write_tile(const Mesher& m, Tile& tile) {
 }
 
 bool same_group(const Mesher& m, uint32_t a, uint32_t b) {
-    return m.order[a].key >> OrderedTile::group_shift == m.order[b].key >> OrderedTile::group_shift;
+    return m.order[a].level == m.order[b].level &&
+           m.order[a].key >> OrderedTile::group_shift == m.order[b].key >> OrderedTile::group_shift;
 }
 
 }  // namespace
 
-uint32_t count_indices(const Mesher& m, const Tile& tile) noexcept {
+bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept {
+    Vector p[4];
+    for (uint32_t k = 0; k < 4; ++k) {
+        const float* q = m.position + 3 * size_t(index[k]);
+        p[k] = {q[0], q[1], q[2]};
+    }
+    const Vector a = p[2] - p[0], b = p[3] - p[1];
+    const float first = dot(cross(p[1] - p[0], a), cross(a, p[3] - p[0]));
+    const float second = dot(cross(p[2] - p[1], b), cross(b, p[0] - p[1]));
+    if ((first > 0) != (second > 0)) return first > 0;
+    return dot(a, a) <= dot(b, b);
+}
+
+void cover(Tile& tile, const float position[3]) noexcept {
+    for (int a = 0; a < 3; ++a) {
+        tile.lower[a] = std::min(tile.lower[a], position[a]);
+        tile.upper[a] = std::max(tile.upper[a], position[a]);
+    }
+}
+
+uint32_t count_indices(const Mesher& m, Tile& tile) noexcept {
+    if (tile.beside) return join_mixed(m, tile, nullptr, false);
     const Neighbourhood near = neighbourhood(m, tile);
     uint32_t quads = 0;
     for (int z = 0; z < tile_cells; ++z)
@@ -172,8 +183,15 @@ void lay_out(Mesher& m) noexcept {
             std::max<uint64_t>(vertices, 2 * uint64_t(m.limits.vertices));  // unknown: ask for twice the room
     }
     const auto counted = [](uint64_t n) { return uint32_t(std::min<uint64_t>(n, ~0u)); };
-    m.vertices_wanted = counted(vertices), m.indices_wanted = counted(indices),
-    m.ranges_wanted = counted(ranges);
+    m.vertices_found = counted(vertices);
+    m.vertices_wanted = std::max(m.vertices_wanted, counted(vertices));
+    m.indices_wanted = std::max(m.indices_wanted, counted(indices));
+    m.ranges_wanted = std::max(m.ranges_wanted, counted(ranges));
+    // An octave quarters all of them, more or less.
+    const auto excess = [](uint64_t wanted, uint64_t most) {
+        return wanted > most && most ? 0.5f * std::log2(float(wanted) / float(most)) + 0.05f : 0.f;
+    };
+    m.too_large = std::max({excess(vertices, most_vertices), excess(indices, most_indices), excess(ranges, most_ranges)});
 }
 
 uint32_t prepare_quads(void* mesher) {

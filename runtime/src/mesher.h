@@ -10,15 +10,23 @@
 
 namespace rill {
 
-inline constexpr int tile_cells = 8, tile_corners = tile_cells + 1;
+inline constexpr int tile_corners = tile_cells + 1;
 inline constexpr uint32_t cells_per_tile = 512, corners_per_tile = 729, rows_per_tile = 64;
 inline constexpr uint32_t no_tile = ~0u;
 inline constexpr int farthest_tile = 1 << 20;  ///< coordinates beyond are not meshed (float runs out there)
 
+/// What lies at one of the 27 places in and round a tile; a tile's neighbours differ by one level at most.
+enum Beside : uint32_t { beside_same = 0, beside_coarser = 1, beside_finer = 2 };
+inline constexpr uint64_t every_coarser = 0x15555555555555, every_finer = 2 * every_coarser;  ///< of 27 places
+constexpr uint32_t place_of(int x, int y, int z) { return uint32_t(x + 1 + 3 * (y + 1) + 9 * (z + 1)); }
+
 /// Cells are addressed by row = y + 8 z and bit x, corners by row = y + 9 z and bit x. Corners on a shared
 /// face stand in both tiles, with the same bits whoever evaluates them: the field is a pure function of x.
 struct Tile {
-    int32_t coord[3];
+    int32_t level, coord[3];
+    float cell;                      ///< size of its cells
+    uint64_t beside;                 ///< two bits per place
+    uint32_t rank;                   ///< its place in the drawing order
     uint32_t vertex_count, index_count;
     uint32_t first_vertex, first_index;
     bool queued;                     ///< in the list of the coming round
@@ -28,14 +36,16 @@ struct Tile {
     uint8_t surface[rows_per_tile];  ///< visited, with corners of both signs
     uint64_t cross[6];               ///< cells wanted of the neighbour beyond each face, this round
     uint16_t known[81], inside[81];  ///< corners evaluated; those of negative value
+    uint64_t turned[6];              ///< faces on borders with finer tiles, as `cross`: see turn_border_faces()
     uint8_t speck[rows_per_tile];    ///< corners that begin a piece which is noise; the tile's own, as cells
     bool has_specks;
     float lower[3], upper[3];        ///< of all vertices its triangles use
+    Beside at_place(uint32_t place) const { return Beside(beside >> (2 * place) & 3); }
     union {
         float value[corners_per_tile];  ///< until the vertices are placed
         struct {
             uint16_t vertex[cells_per_tile];   ///< first vertex of each surface cell, from first_vertex
-            uint16_t patches[cells_per_tile];  ///< row of cell_patches
+            CellPattern pattern[cells_per_tile];
         } placed;
     };
 };
@@ -59,7 +69,8 @@ struct MesherScratch {
     // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
     uint8_t patch[capacity];
-    uint16_t vertex[cells_per_tile], patches[cells_per_tile];
+    uint16_t vertex[cells_per_tile];
+    CellPattern pattern[cells_per_tile];
     uint64_t corners_evaluated;
 };
 
@@ -72,20 +83,27 @@ struct FieldAccess {
                               const float*, uint32_t, float*, float*, float*, float*, float*) noexcept;
 };
 
-/// A place in the drawing order: groups of 4³ tiles one after the other, in each its tiles, z y x.
+/// A place in the drawing order: coarse tiles before fine ones, of each level groups of 4³ tiles one after the
+/// other, in each its tiles, z y x.
 struct OrderedTile {
     uint64_t key;
     uint32_t tile;
+    int32_t level;
     static constexpr uint32_t group_shift = 6;  ///< key >> group_shift names the group
 };
+
+enum class MeshPhase : uint8_t { march, find_specks, turn_specks, counts, vertices, quads, ranges, done };
 
 struct Mesher {
     MeshLimits limits;
     MeshInput input;
     FieldAccess access;
-    float inverse_tile;  ///< 1 / size of a tile
     uint32_t cut;
-    uint32_t vertices_wanted, indices_wanted, ranges_wanted;
+    uint32_t vertices_wanted, indices_wanted, ranges_wanted;  ///< the most of all attempts
+    uint32_t vertices_found;   ///< by this attempt
+    float octaves, too_large;  ///< given up; how many too few those were, found by lay_out()
+    MeshPhase phase;
+    void (*run)(void* mesher, uint32_t task, uint32_t worker);  ///< of the tasks that are out
 
     Tile* tiles;
     uint32_t tile_count;
@@ -129,14 +147,26 @@ void for_tiles(uint32_t task, uint32_t per_task, uint32_t count, Work work) {
 }
 
 // tiles.cpp
-uint32_t find_tile(const Mesher& m, const int32_t coord[3]) noexcept;
-/// no_tile when it is out of sight, out of reach, or no room is left.
-uint32_t find_or_create_tile(Mesher& m, const int32_t coord[3]) noexcept;
-float corner_at(const Mesher& m, const Tile& tile, uint32_t axis, uint32_t corner) noexcept;
+uint32_t find_tile(const Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
+/// no_tile when it is out of sight, out of reach, or no room is left. The octree must have a leaf there.
+uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
+/// The leaf that holds a position; false when that is out of reach.
+bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t coord[3]) noexcept;
+float corner_at(const Tile& tile, uint32_t axis, uint32_t corner) noexcept;
 /// Puts it into the list of the coming round.
 void queue_tile(Mesher& m, uint32_t tile) noexcept;
 /// Fills m.order with the tiles that have surface.
 void sort_tiles(Mesher& m) noexcept;
+
+// hanging_corners.cpp: what cells of different size agree on
+/// Corners on borders with coarser tiles that the coarser do not have, per row as Tile::known.
+void find_hanging(const Tile& tile, uint16_t hanging[81]) noexcept;
+/// Adds what hanging corners among `need` follow from.
+void need_parents(const uint16_t hanging[81], uint16_t need[81]) noexcept;
+/// Gives them their values, from their parents'.
+void settle_hanging(Tile& tile, const uint16_t hanging[81], const uint16_t need[81]) noexcept;
+/// Fills Tile::turned: where the smaller cells join the liquid across an ambiguous face of a larger one.
+void turn_border_faces(Tile& tile) noexcept;
 
 // march.cpp: field → surface cells
 uint32_t prepare_march(void* mesher);
@@ -153,10 +183,18 @@ void run_counts(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_vertices(void* mesher);
 void run_vertices(void* mesher, uint32_t task, uint32_t worker);
 
+// mixed_edges.cpp
+/// A tile with neighbours of another size: counts the indices of its polygons, or writes them (null: only covers).
+uint32_t join_mixed(const Mesher& m, Tile& tile, uint32_t* out, bool write) noexcept;
+
 // mesh_to_buffers.cpp
 /// How many indices the tile's quads take.
-uint32_t count_indices(const Mesher& m, const Tile& tile) noexcept;
-/// Prefix sums over the order, cut at the capacities.
+uint32_t count_indices(const Mesher& m, Tile& tile) noexcept;
+/// Widens the tile's bounds by a position.
+void cover(Tile& tile, const float position[3]) noexcept;
+/// Split a quad along 0–2 (else 1–3): the shorter, unless only the other keeps both triangles facing one way.
+bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept;
+/// Prefix sums over the order, cut at the capacities. Sets too_large.
 void lay_out(Mesher& m) noexcept;
 uint32_t prepare_quads(void* mesher);
 void run_quads(void* mesher, uint32_t task, uint32_t worker);

@@ -3,6 +3,7 @@
 //
 //   file → directory                        asset_to_directory.cpp      once, in poll()
 //   time, views, directory → plan, wants    view_to_wants.cpp           begin_frame()
+//   plan, time there is → detail            frame_budget.cpp            begin_frame()
 //   wants → reads                           wants_to_reads.cpp          begin_frame(): residency, eviction
 //   reads → chunks                          reads_to_chunks.cpp         completions; decoding in tasks
 //   chunks → points                         chunks_to_points.cpp        tasks, over coefficients_to_points.h
@@ -23,6 +24,7 @@
 #include "format/check.h"
 #include "format/fourier_extension.h"
 #include "format/tracks.h"
+#include "levels.h"
 #include "relay.h"
 #include "rill/rill.h"
 #include "surface/field.h"
@@ -37,7 +39,7 @@ struct Directory {
     format::DirectoryTables tables;      ///< settings: zero-terminated
     format::BasisTables basis;
     AssetInfo info;
-    float layer_spacing[format::max_layers];  ///< mean over the clip, of this and coarser layers
+    float layer_error[format::max_layers];  ///< mean over the clip, with this and all coarser layers; falls
     uint32_t most_point_tracks, most_drop_tracks, most_chunks;  ///< of any one window
     uint64_t suggested_resident_bytes;
 };
@@ -101,7 +103,6 @@ void release_tables(Asset& asset) noexcept;
 
 // ---- time, views, directory → plan ----------------------------------------------------------------
 
-inline constexpr uint32_t most_views = 16;
 inline constexpr float prefetch_seconds = 1;       ///< of real time, and one window at least
 
 struct Moment {
@@ -115,27 +116,34 @@ struct Want {
     float seconds_until_needed;    ///< real seconds
 };
 struct Detail {
-    float cell_size;               ///< asset space
-    uint32_t layers;               ///< prefix wanted
-    float pixel_error;             ///< what cell_size comes to on the screen, at its nearest; 0: no view
+    uint32_t layers;               ///< longest prefix wanted of any block
+    float pixels_per_metre;        ///< where what is seen is nearest; 0: no view
 };
 struct Plan {
     Moment moment;
     float rate;
+    bool loops;
     uint32_t view_count;
     FrustumPlanes views[most_views];   ///< asset space
     float eyes[most_views][3];         ///< asset space
+    Levels levels;                 ///< as asked; kept from frame to frame while the views hardly move (hysteresis)
+    Levels levels_drawn;           ///< with the detail given up for the sake of time
     Detail detail;
     uint32_t blocks_in_view;
     uint32_t now_count, want_count;    ///< wants[0, now_count) are of this moment, the rest is prefetch
     Want* wants;                       ///< chunk_count of them: most important first
-    int32_t level;                     ///< cell = source's · 2^level; kept between frames (hysteresis)
 };
+inline constexpr float reach_in_spacings = 3;      ///< how far points act beyond their own bounds
+/// Whether a box, widened, lies inside a frustum at least in part; true too for some beside its edges.
+bool touches(const FrustumPlanes& view, const float* lower, const float* upper, float wider) noexcept;
 Moment moment_at(const Directory& directory, double seconds) noexcept;
-/// Real seconds until `window` is needed by the play direction; what lies behind comes after all that is ahead.
+/// Real seconds until `window` is needed by the play direction, round the end if the clip loops; what lies behind
+/// comes after all that is ahead.
 float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept;
-/// Fills everything but Plan::wants' address. `coarser`: levels to add for the sake of time.
-void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept;
+/// Of what is in sight of this moment; the largest if nothing is.
+float smallest_cell(const Directory& directory, const Plan& plan, const Levels& levels) noexcept;
+/// Fills everything but Plan::wants' address.
+void plan_frame(const Directory& directory, const Frame& frame, Plan& plan) noexcept;
 
 // ---- plan → reads → chunks ------------------------------------------------------------------------
 
@@ -174,6 +182,7 @@ struct Residency {
     uint32_t slot_count, slots_out;
     uint32_t* to_decode;           ///< arrived chunks that this frame decodes
     uint32_t decode_count;
+    uint64_t decode_bytes;         ///< of those
     uint64_t frame_number;
     uint64_t frame_bytes_asked;
     bool waiting;                  ///< Frame::wait_for_data: failed reads are repeated at once
@@ -195,8 +204,9 @@ bool collect_reads(Residency& residency, const Directory& directory) noexcept;
 /// Nothing of this moment can still arrive by waiting.
 bool is_settled(const Residency& residency, const Plan& plan) noexcept;
 void forget_reads(Residency& residency) noexcept;
-/// Chooses what this frame decodes: all of this moment, and some of the prefetch.
-void choose_decodes(Residency& residency, const Plan& plan) noexcept;
+/// Chooses what this frame decodes: of this moment what `most_bytes` allows, one chunk at least, and some of the
+/// prefetch.
+void choose_decodes(Residency& residency, const Directory& directory, const Plan& plan, uint64_t most_bytes) noexcept;
 /// One task per chunk; context Player.
 extern const Stage decode_stage;
 /// After the frame: staging back to the heap, faults counted and logged.
@@ -226,6 +236,27 @@ struct Evaluation {
 inline constexpr uint32_t evaluate_stage_count = 2;
 extern const Stage evaluate_stages[evaluate_stage_count];  ///< context Player
 
+// ---- plan, time there is → detail -----------------------------------------------------------------
+
+/// Of detail, that may be given up: what then is left of the liquid is some cells across.
+float most_octaves(const Directory& directory) noexcept;
+/// What work takes here, learned from frames with Budget::microseconds; starts wary.
+struct Pace {
+    float octaves = 0;             ///< given up before the frame begins
+    float us_per_vertex = 1, us_per_point = 4, us_per_byte = 1, vertices_per_cell = 1.5f;
+    float cells = 0, points = 0;   ///< estimated of this frame
+    uint32_t lates = 0;            ///< how often the mesher has been told that it is late
+};
+uint64_t read_clock(const Host& host) noexcept;
+/// 0 when this frame has no time cap.
+uint64_t microseconds_now(const Player& player) noexcept;
+/// After plan_frame(): sets Pace::octaves and Plan::levels_drawn.
+void give_up_detail(Player& player) noexcept;
+/// MeshInput::late.
+bool is_late(void* player) noexcept;
+uint64_t decode_bytes_affordable(const Player& player) noexcept;
+void learn_pace(Player& player, const MeshCounts& mesh, uint64_t bytes_decoded) noexcept;
+
 // ---- points → field → mesh ------------------------------------------------------------------------
 
 inline constexpr uint32_t field_stage_count = 2;
@@ -248,7 +279,7 @@ struct rill::Player {
     void* field_memory;
     rill::Mesher* mesher;
     rill::Relay relay;
-    uint32_t coarser;                  ///< levels given up for Budget::microseconds
+    rill::Pace pace;
     /// A stage that only reads the clock, and only when there is a time cap.
     struct Mark {
         Player* player;
@@ -261,7 +292,7 @@ namespace rill {
 
 // ---- frame → stats ----------------------------------------------------------------------------------
 
-/// After the last stage and settle_decodes(). Also steers Player::coarser.
+/// After the last stage and settle_decodes(). Also learns the pace.
 Stats count_all(Player& player) noexcept;
 
 }  // namespace rill

@@ -188,15 +188,9 @@ bool enlist(Asset& asset, Player* player) {
 
 // ---- a frame ----------------------------------------------------------------------------------------
 
-uint64_t now_us(const Player& player) {
-    if (!player.frame.budget.microseconds) return 0;  // frames are repeatable: no clock is read
-    using namespace std::chrono;
-    return uint64_t(duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
-}
-
 uint32_t prepare_mark(void* context) {
     auto& mark = *static_cast<Player::Mark*>(context);
-    mark.us = now_us(*mark.player);
+    mark.us = microseconds_now(*mark.player);
     return 0;
 }
 const Stage mark_stage = {prepare_mark, nullptr, false};
@@ -212,7 +206,7 @@ void pump_reads(Player& player) {
 
 void chain_stages(Player& player) {
     Relay& relay = player.relay;
-    choose_decodes(player.residency, player.plan);
+    choose_decodes(player.residency, *player.directory, player.plan, decode_bytes_affordable(player));
     relay.clear(player.asset->host.jobs);
     relay.add(&mark_stage, 1, &player.decode_begun);
     relay.add(&decode_stage, 1, &player);
@@ -251,6 +245,12 @@ void finish_stages(Player& player) {
 }
 
 }  // namespace
+
+uint64_t read_clock(const Host& host) noexcept {
+    if (host.clock) return host.clock(host.clock_user);
+    using namespace std::chrono;
+    return uint64_t(duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
+}
 
 const char* text(Status status) noexcept {
     switch (status) {
@@ -392,17 +392,18 @@ Status begin_frame(Player* player, const Frame& frame) noexcept {
     p.started = false;
     if (Target* target = frame.target)
         target->vertices_used = target->indices_used = target->ranges_used = target->points_used = 0;
-    const uint64_t begun = now_us(p);
+    const uint64_t begun = microseconds_now(p);
 
     Residency& r = p.residency;
     ++r.frame_number;
     r.frame_bytes_asked = 0;
     r.waiting = frame.wait_for_data;
     drop_ranks(r, p.plan);
-    plan_frame(*p.directory, frame, p.coarser, p.plan);
+    plan_frame(*p.directory, frame, p.plan);
+    give_up_detail(p);
     rank_wants(r, p.plan);
     pump_reads(p);
-    p.plan_us = uint32_t(now_us(p) - begun);
+    p.plan_us = uint32_t(microseconds_now(p) - begun);
     if (!r.waiting) start_stages(p);
     return Status::ok;
 }
@@ -410,13 +411,13 @@ Status begin_frame(Player* player, const Frame& frame) noexcept {
 Status end_frame(Player* player, Stats* out) noexcept {
     if (!player || !player->frame_open) return Status::bad_argument;
     Player& p = *player;
-    const uint64_t begun = now_us(p);
+    const uint64_t begun = microseconds_now(p);
     if (!p.started) {
         wait_for_data(p);
         start_stages(p);
     }
     finish_stages(p);
-    p.wait_us = uint32_t(now_us(p) - begun);
+    p.wait_us = uint32_t(microseconds_now(p) - begun);
     settle_decodes(p.residency, *p.directory);
     const Stats stats = count_all(p);
     p.frame_open = false;

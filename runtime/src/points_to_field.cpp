@@ -25,9 +25,19 @@ uint32_t prepare_mesh(void* context) {
     auto& player = *static_cast<Player*>(context);
     surface::finish_field(player.field);
     Target* target = player.frame.target;
-    begin_mesh(player.mesher, MeshInput{&player.field, player.plan.detail.cell_size,
-                                        player.plan.view_count ? player.plan.views : nullptr,
-                                        player.plan.view_count, target->velocity.data != nullptr, target});
+    MeshInput input{};
+    input.field = &player.field;
+    input.levels = player.plan.levels_drawn;
+    input.views = player.plan.view_count ? player.plan.views : nullptr;
+    input.view_count = player.plan.view_count;
+    input.velocity = target->velocity.data != nullptr;
+    input.target = target;
+    if (player.frame.budget.cell_size == 0) {  // else that size is an order
+        input.most_octaves = std::max(0.f, most_octaves(*player.directory) - player.pace.octaves);
+        input.late = player.frame.budget.microseconds ? is_late : nullptr;
+        input.user = &player;
+    }
+    begin_mesh(player.mesher, input);
     return 0;
 }
 

@@ -89,13 +89,16 @@ bool collect_reads(Residency& r, const Directory& directory) noexcept {
     return any;
 }
 
-void choose_decodes(Residency& r, const Plan& plan) noexcept {
+void choose_decodes(Residency& r, const Directory& directory, const Plan& plan, uint64_t most_bytes) noexcept {
     r.decode_count = 0;
+    r.decode_bytes = 0;
     uint32_t prefetch = 0;
     for (uint32_t i = 0; i < plan.want_count && prefetch < most_prefetch_decodes; ++i) {
-        const uint32_t chunk = plan.wants[i].chunk;
+        const uint32_t chunk = plan.wants[i].chunk, bytes = directory.tables.chunks[chunk].bytes;
         if (r.chunks[chunk].state != ChunkState::arrived) continue;
+        if (r.decode_count && r.decode_bytes + bytes > most_bytes) break;
         r.to_decode[r.decode_count++] = chunk;
+        r.decode_bytes += bytes;
         if (i >= plan.now_count) ++prefetch;
     }
 }

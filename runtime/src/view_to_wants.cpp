@@ -9,11 +9,11 @@ namespace rill {
 namespace {
 
 constexpr float automatic_pixel_error = 2;  ///< Budget::pixel_error 0
-constexpr float most_cells_per_spacing = 3; ///< a layer is fine enough for a cell when its points are so near
-constexpr float reach_in_spacings = 3;      ///< how far points act beyond their own bounds
+constexpr float most_error = 1;             ///< in cells: a layer that leaves so little wrong is fine enough
 constexpr float most_cells_across = 1 << 20;
-constexpr int32_t most_levels = 16;
-constexpr float hysteresis = 0.25f;         ///< in levels
+/// Cells stay as they are while an eye moves by no more than this share of its distance, and the sizes asked for
+/// change by no more than this many octaves: a camera that trembles changes nothing.
+constexpr float most_drift = 1 / 8.f;
 
 /// World planes and eyes into asset space. The matrix is rotation · scale | translation, so its inverse
 /// is its transpose over scale².
@@ -37,19 +37,10 @@ void take_views(const Frame& frame, Plan& plan) {
     }
 }
 
-bool inside(const FrustumPlanes& view, const float* lower, const float* upper, float wider) {
-    for (const float* plane : view.planes) {
-        float farthest = plane[3] + wider;
-        for (int a = 0; a < 3; ++a) farthest += plane[a] * (plane[a] > 0 ? upper[a] : lower[a]);
-        if (farthest < 0) return false;
-    }
-    return true;
-}
-
 bool is_seen(const Plan& plan, const format::ChunkRecord& chunk) {
     if (!plan.view_count) return true;
     for (uint32_t v = 0; v < plan.view_count; ++v)
-        if (inside(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) return true;
+        if (touches(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) return true;
     return false;
 }
 
@@ -62,90 +53,131 @@ float distance_to(const float* x, const format::ChunkRecord& chunk) {
     return std::sqrt(squared);
 }
 
-/// Most pixels that one metre of asset space covers anywhere in sight; 0: nothing in sight.
-float pixels_per_metre(const Directory& directory, const Frame& frame, const Plan& plan) {
+/// Cells that the nearest part of the chunk is drawn with.
+float cell_at(const Levels& levels, const format::ChunkRecord& chunk) {
+    float most = levels.eye_count ? 1e15f : levels.cell_size;
+    for (uint32_t e = 0; e < levels.eye_count; ++e)
+        most = std::min(most, distance_to(levels.eyes[e], chunk) / levels.reach[e]);
+    return std::max(levels.cell_size, most);
+}
+
+/// Distance of each eye from what it sees, infinite where it sees nothing.
+struct Sight {
+    float nearest[most_views];
+};
+Sight look(const Directory& directory, const Plan& plan) {
     const format::WindowRecord& w = directory.tables.windows[plan.moment.window];
-    float most = 0;
+    Sight sight;
+    std::fill(sight.nearest, sight.nearest + most_views, 1e15f);
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
-        if (chunk.layer > 0 && most > 0) break;  // all layers fill the same space: the coarsest present will do
         for (uint32_t v = 0; v < plan.view_count; ++v) {
-            if (!inside(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) continue;
+            if (!touches(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) continue;
             // Nearer than a cell the eye is in the surface: no cell is small enough.
             const float distance = std::max(distance_to(plan.eyes[v], chunk), directory.header.cell_size);
-            most = std::max(most, frame.views[v].pixels_per_radian / distance);
+            sight.nearest[v] = std::min(sight.nearest[v], distance);
         }
     }
-    return most;
+    return sight;
 }
 
-uint32_t layers_for(const Directory& directory, float cell_size) {
-    for (uint32_t l = 0; l + 1 < directory.header.layer_count; ++l)
-        if (directory.layer_spacing[l] <= most_cells_per_spacing * cell_size) return l + 1;
-    return directory.header.layer_count;
-}
-
-/// One cell size and one prefix of layers for the whole frame. The level holds on until the view has
-/// moved a quarter of a level past the border, lest it flicker.
-Detail choose_detail(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) {
-    const float source = directory.header.cell_size;
-    // In asset space: angles are the same there as in the world.
-    const float per_metre = pixels_per_metre(directory, frame, plan);
-    Detail detail{};
-    if (frame.budget.cell_size > 0) {
-        detail.cell_size = frame.budget.cell_size;
-    } else {
-        int32_t level = 0;
-        if (per_metre > 0) {
-            const float pixels = frame.budget.pixel_error > 0 ? frame.budget.pixel_error : automatic_pixel_error;
-            const float exact = std::log2(std::max(pixels / (per_metre * source), 1e-9f));
-            level = int32_t(std::floor(exact));
-            if (exact > float(plan.level) - hysteresis && exact < float(plan.level) + 1 + hysteresis)
-                level = plan.level;
-            level = std::clamp(level, 0, most_levels);
-        }
-        plan.level = level;
-        detail.cell_size = source * float(1u << (uint32_t(level) + coarser));
-    }
+Levels levels_asked(const Directory& directory, const Frame& frame, const Plan& plan) {
+    Levels levels{};
+    levels.cell_size = frame.budget.cell_size > 0 ? frame.budget.cell_size : directory.header.cell_size;
     // A cell so small that the clip cannot be counted in cells is a mistake that costs nothing to survive.
     float across = 0;
     for (int a = 0; a < 3; ++a)
         across = std::max(across, directory.header.upper[a] - directory.header.lower[a]);
-    detail.cell_size = std::max(detail.cell_size, across / most_cells_across);
-    detail.pixel_error = detail.cell_size * per_metre;
-    detail.layers = detail.cell_size <= source ? directory.header.layer_count
-                                               : layers_for(directory, detail.cell_size);
-    if (frame.budget.layers) detail.layers = std::min(detail.layers, frame.budget.layers);
-    return detail;
+    levels.cell_size = std::max(levels.cell_size, across / most_cells_across);
+    if (frame.budget.cell_size > 0) return levels;
+    const float pixels = frame.budget.pixel_error > 0 ? frame.budget.pixel_error : automatic_pixel_error;
+    levels.eye_count = plan.view_count;
+    for (uint32_t v = 0; v < plan.view_count; ++v) {
+        std::copy(plan.eyes[v], plan.eyes[v] + 3, levels.eyes[v]);
+        levels.reach[v] = std::clamp(frame.views[v].pixels_per_radian / pixels, least_reach, 1e9f);
+    }
+    return levels;
+}
+
+/// So near to each other that one may stand for the other.
+bool alike(const Levels& a, const Levels& b, const Sight& sight) {
+    if (a.cell_size != b.cell_size || a.eye_count != b.eye_count) return false;
+    for (uint32_t e = 0; e < a.eye_count; ++e) {
+        if (std::abs(std::log2(a.reach[e] / b.reach[e])) > most_drift) return false;
+        float moved = 0;
+        for (int k = 0; k < 3; ++k) moved += (a.eyes[e][k] - b.eyes[e][k]) * (a.eyes[e][k] - b.eyes[e][k]);
+        // All cells nearer than the reach are of one size anyway.
+        if (std::sqrt(moved) > most_drift * std::max(sight.nearest[e], b.reach[e] * b.cell_size)) return false;
+    }
+    return true;
+}
+
+uint32_t layers_for(const Directory& directory, const Frame& frame, float cell_size) {
+    const uint32_t count = directory.header.layer_count;
+    uint32_t layers = count;
+    if (cell_size > directory.header.cell_size)
+        for (layers = 1; layers < count && directory.layer_error[layers - 1] > most_error * cell_size;) ++layers;
+    return frame.budget.layers ? std::min(layers, frame.budget.layers) : layers;
+}
+
+void choose_detail(const Directory& directory, const Frame& frame, Plan& plan) {
+    const Sight sight = look(directory, plan);
+    const Levels asked = levels_asked(directory, frame, plan);
+    if (!alike(plan.levels, asked, sight)) plan.levels = asked;
+    plan.levels_drawn = plan.levels;
+    plan.detail = {};
+    for (uint32_t v = 0; v < plan.view_count; ++v)
+        if (sight.nearest[v] < 1e15f)
+            plan.detail.pixels_per_metre =
+                std::max(plan.detail.pixels_per_metre, frame.views[v].pixels_per_radian / sight.nearest[v]);
+}
+
+/// What is wanted of a window's blocks: the nearer, the more layers. A prefix, for all of a block.
+struct BlockLayers {
+    uint8_t count[format::max_blocks];
+};
+BlockLayers layers_of_blocks(const Directory& directory, const Frame& frame, uint32_t window, const Plan& plan) {
+    const format::WindowRecord& w = directory.tables.windows[window];
+    BlockLayers layers{};
+    for (uint32_t k = 0; k < w.chunk_count; ++k) {
+        const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
+        if (!is_seen(plan, chunk)) continue;
+        const uint32_t wanted = layers_for(directory, frame, cell_at(plan.levels, chunk));
+        layers.count[chunk.block] = uint8_t(std::max<uint32_t>(layers.count[chunk.block], wanted));
+    }
+    return layers;
 }
 
 /// Chunks stand coarse before fine already. Every chunk comes once: the list has room for all.
-void want_window(const Directory& directory, uint32_t window, Plan& plan) {
+void want_window(const Directory& directory, const Frame& frame, uint32_t window, Plan& plan) {
     const format::WindowRecord& w = directory.tables.windows[window];
     const float seconds = seconds_until(directory, plan, window);
+    const BlockLayers layers = layers_of_blocks(directory, frame, window, plan);
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
-        if (chunk.layer >= plan.detail.layers) break;
-        if (is_seen(plan, chunk)) plan.wants[plan.want_count++] = {w.first_chunk + k, seconds};
+        if (chunk.layer >= layers.count[chunk.block] || !is_seen(plan, chunk)) continue;
+        plan.wants[plan.want_count++] = {w.first_chunk + k, seconds};
+        if (window == plan.moment.window)
+            plan.detail.layers = std::max<uint32_t>(plan.detail.layers, layers.count[chunk.block]);
     }
 }
 
-void list_wants(const Directory& directory, Plan& plan) {
+void list_wants(const Directory& directory, const Frame& frame, Plan& plan) {
     const uint32_t now = plan.moment.window, end = directory.header.window_count;
     const bool back = plan.rate < 0;
     plan.want_count = 0;
-    want_window(directory, now, plan);
+    want_window(directory, frame, now, plan);
     plan.now_count = plan.want_count;
     for (uint32_t step = 1; step < end; ++step) {
-        const bool any = back ? step <= now : step < end - now;
-        if (!any) break;
-        const uint32_t window = back ? now - step : now + step;
+        const uint32_t window = (back ? now + end - step : now + step) % end;
+        if (!plan.loops && back != (window < now)) break;
         if (step > 1 && seconds_until(directory, plan, window) > prefetch_seconds) break;
-        want_window(directory, window, plan);
+        want_window(directory, frame, window, plan);
     }
+    if (plan.loops) return;
     // Standing still the next move may go either way; going back it often ends in play forward again.
-    if (plan.rate == 0 && now > 0) want_window(directory, now - 1, plan);
-    if (back && now + 1 < end) want_window(directory, now + 1, plan);
+    if (plan.rate == 0 && now > 0) want_window(directory, frame, now - 1, plan);
+    if (back && now + 1 < end) want_window(directory, frame, now + 1, plan);
 }
 
 uint32_t count_blocks_in_view(const Directory& directory, const Plan& plan) {
@@ -164,6 +196,15 @@ uint32_t count_blocks_in_view(const Directory& directory, const Plan& plan) {
 }
 
 }  // namespace
+
+bool touches(const FrustumPlanes& view, const float* lower, const float* upper, float wider) noexcept {
+    for (const float* plane : view.planes) {
+        float farthest = plane[3] + wider;
+        for (int a = 0; a < 3; ++a) farthest += plane[a] * (plane[a] > 0 ? upper[a] : lower[a]);
+        if (farthest < 0) return false;
+    }
+    return true;
+}
 
 /// The last frame at or before the time decides, so a time on a window's border is the later window's.
 Moment moment_at(const Directory& directory, double seconds) noexcept {
@@ -193,25 +234,42 @@ Moment moment_at(const Directory& directory, double seconds) noexcept {
     return moment;
 }
 
+float smallest_cell(const Directory& directory, const Plan& plan, const Levels& levels) noexcept {
+    const format::WindowRecord& w = directory.tables.windows[plan.moment.window];
+    float smallest = levels.cell(levels.coarsest()), cell = levels.cell_size;
+    for (uint32_t k = 0; k < w.chunk_count; ++k) {
+        const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
+        if (is_seen(plan, chunk)) smallest = std::min(smallest, cell_at(levels, chunk));
+    }
+    while (2 * cell <= smallest) cell *= 2;  // the largest power of two that fits: what Levels::divided() comes to
+    return cell;
+}
+
 float seconds_until(const Directory& directory, const Plan& plan, uint32_t window) noexcept {
     constexpr double behind = 1e6;  // after everything ahead
     if (window == plan.moment.window) return 0;
     const format::WindowRecord& w = directory.tables.windows[window];
     const bool later = window > plan.moment.window;
     const double border = frame_time(directory, later ? w.first_sample : w.first_sample + w.sample_count - 1);
-    const double distance = std::abs(border - plan.moment.seconds);
+    double distance = std::abs(border - plan.moment.seconds);
     if (plan.rate == 0) return float(distance);
+    if (plan.loops && later != (plan.rate > 0)) {
+        const double clip = frame_time(directory, directory.header.frame_count - 1);
+        const double far = frame_time(directory, later ? w.first_sample + w.sample_count - 1 : w.first_sample);
+        return float((clip - std::abs(far - plan.moment.seconds)) / std::max(1e-6f, std::abs(plan.rate)));
+    }
     const double real = distance / std::max(1e-6f, std::abs(plan.rate));
     return float(later == (plan.rate > 0) ? real : behind + real);
 }
 
-void plan_frame(const Directory& directory, const Frame& frame, uint32_t coarser, Plan& plan) noexcept {
+void plan_frame(const Directory& directory, const Frame& frame, Plan& plan) noexcept {
     plan.moment = moment_at(directory, frame.seconds);
     plan.rate = frame.rate;
+    plan.loops = frame.loops;
     take_views(frame, plan);
-    plan.detail = choose_detail(directory, frame, coarser, plan);
+    choose_detail(directory, frame, plan);
     plan.blocks_in_view = count_blocks_in_view(directory, plan);
-    list_wants(directory, plan);
+    list_wants(directory, frame, plan);
 }
 
 }  // namespace rill

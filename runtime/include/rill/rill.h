@@ -81,6 +81,10 @@ struct Host {
     void* log_user = nullptr;
     /// May be null. The message is valid during the call.
     void (*log)(void* user, Status status, const char* message) = nullptr;
+    void* clock_user = nullptr;
+    /// Microseconds that never go back; null: the system's. Read from any worker, and only for frames with
+    /// Budget::microseconds.
+    uint64_t (*clock)(void* user) = nullptr;
 };
 
 struct AssetInfo {
@@ -137,7 +141,8 @@ struct Budget {
     float cell_size;       ///< if > 0: this cell size (asset space), whatever the views say
     uint32_t layers;       ///< use at most so many layers
     uint32_t points;       ///< per frame
-    uint32_t microseconds; ///< 0: no clock is read, and frames are repeatable
+    uint32_t microseconds; ///< of a frame's work, from its first stage to its last: what is seen of the surface gets
+                           ///< coarser. 0: no clock is read, and frames are repeatable
     uint64_t read_bytes;   ///< asked for per frame
 };
 /// May be mapped GPU memory: written once, never read back. null data = not wanted.
@@ -165,6 +170,7 @@ struct Target {
 struct Frame {              ///< views and target must stay valid until end_frame()
     double seconds;         ///< where in the clip; any jump is legal; clamped to the clip
     float rate;             ///< clip seconds per real second, signed: steers prefetch
+    bool loops;             ///< beyond one end of the clip comes the other: steers prefetch
     float asset_to_world[12];  ///< three rows of four: rotation·scale | translation
     const View* views;      ///< none: no culling, and cells of the source's size
     uint32_t view_count;
