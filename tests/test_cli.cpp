@@ -54,6 +54,29 @@ const Clip& clip() {
     return clip;
 }
 
+/// Every byte is accounted for, once, and each layer's are those of its chunks and their records.
+void check_bytes(const std::string& asset) {
+    const nlohmann::json json = nlohmann::json::parse(run_rill("info --json " + asset).text, nullptr, false);
+    REQUIRE(json.is_object());
+    const nlohmann::json& bytes = json["bytes"];
+    uint64_t all = 0;
+    for (const auto& [kind, value] : bytes.items()) all += value.is_number() ? value.get<uint64_t>() : 0;
+    REQUIRE(bytes["layers"].size() == json["layers"].size());
+    for (size_t l = 0; l < bytes["layers"].size(); ++l) {
+        CAPTURE(l);
+        const nlohmann::json &kinds = bytes["layers"][l], &layer = json["layers"][l];
+        const uint64_t chunks = layer["chunks"];
+        uint64_t sum = 0;
+        for (const auto& [kind, value] : kinds.items()) sum += value.get<uint64_t>();
+        CHECK(sum == layer["bytes"].get<uint64_t>() + 72 * chunks);
+        CHECK(kinds["heads"] == 22 * chunks);
+        CHECK(kinds["padding"] <= chunks);  // less than a byte each
+        all += sum;
+    }
+    CHECK(all == fs::file_size(asset));
+    CHECK(bytes["unused"] == 0);
+}
+
 }  // namespace
 
 TEST_CASE("usage: help is 0, mistakes are 1 and name the option") {
@@ -237,6 +260,8 @@ TEST_CASE("info") {
     CHECK(json["first_frame"] == 3);
     CHECK(json["file_bytes"] == fs::file_size(clip().asset));
     CHECK(json["windows"].size() >= 2);
+    check_bytes(clip().asset);
+    for (const char* kind : {"heads", "structure", "births", "first_coefficients", "motion", "normals"}) CHECK(json["bytes"]["layers"][0][kind] > 0);
 }
 
 TEST_CASE("assets that are none: 2, whatever the command") {
