@@ -37,7 +37,8 @@ Mesh ellipsoid(const glm::vec3& centre, const glm::vec3& velocity) {
     return mesh;
 }
 Mesh scene(const glm::vec3& drop, const glm::vec3& velocity) {
-    Mesh mesh = sphere(40, 1);  // too large
+    Mesh mesh;
+    join(mesh, sphere(40, 1));  // too large
     join(mesh, ellipsoid(drop, velocity));
     join(mesh, sphere(20, 0.1f, {0, 3, 0}, 0.3f));  // of a drop's size, but no ellipsoid
     Mesh bubble = sphere(16, 0.1f, {0, 0, 0});  // air in the large ball
