@@ -41,12 +41,19 @@ void add(ChunkBits& sum, const ChunkBits& more) {
     sum.normals += more.normals, sum.drops += more.drops;
 }
 
-/// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches.
+/// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
 void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, float reach) {
     chunk.lower = glm::vec3(1e30f), chunk.upper = glm::vec3(-1e30f);
     for (const TrackSamples* track : tracks)
-        for (const glm::vec3& p : track->position)
-            chunk.lower = glm::min(chunk.lower, p - reach), chunk.upper = glm::max(chunk.upper, p + reach);
+        for (size_t k = 0; k < track->position.size(); ++k) {
+            const glm::vec3& p = track->position[k];
+            float wide = reach;
+            if (track->drop) {
+                const auto& s = track->shape[k];
+                wide = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+            }
+            chunk.lower = glm::min(chunk.lower, p - wide), chunk.upper = glm::max(chunk.upper, p + wide);
+        }
 }
 
 struct LayerError {
@@ -98,7 +105,7 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
     for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
     const std::vector<uint32_t> layer = assign_layers(coded.decoded, cost, window.samples(), layers, goal.jobs);
     uint32_t block_count = 0;
-    const std::vector<uint32_t> block = assign_blocks(window, most_tracks_per_block, block_count);
+    const std::vector<uint32_t> block = assign_blocks(coded.decoded, most_tracks_per_block, block_count);
     const std::vector<LayerError> errors = layer_errors(window, coded, layer, layers, goal.jobs);
     std::vector<ChunkToWrite> chunks(size_t(layers) * block_count);
     parallel_for(chunks.size(), goal.jobs, [&](size_t c) {
@@ -234,7 +241,7 @@ private:
         std::vector<Path> survivors;
         std::shared_ptr<const SurfaceFrame> border;
         for (uint32_t first = begin;; first += plan_.window) {
-            Window window = load(first, std::min(end, first + plan_.window), border);
+            Window window = load(first, std::min(end, first + plan_.window), border, float(tolerance));
             window.opens_span = first == begin;
             const uint32_t last = first + uint32_t(window.samples()) - 1;
             grow_tracks(window, survivors, goal);
@@ -255,14 +262,19 @@ private:
         writer.finish(facts);
     }
 
-    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border) const {
+    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border, float tolerance) const {
         Window window;
         window.first = int(first);
         window.frames.resize(last - first + 1);
         for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
         parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
-            window.frames[s] = s == 0 && border ? border
-                                                : std::make_shared<SurfaceFrame>(reader_.read(first + s), survey_.edge);
+            if (s == 0 && border) {
+                window.frames[s] = border;
+                return;
+            }
+            Mesh mesh = reader_.read(first + s);
+            std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
+            window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
         });
         return window;
     }

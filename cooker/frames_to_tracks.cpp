@@ -213,7 +213,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
                                              });
             coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
         });
-        if (round == coding_rounds) return coded;
+        if (round == coding_rounds) break;
         if (round == 0) mend(window, coded, goal);
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
             const SurfaceFrame& frame = *window.frames[s];
@@ -223,6 +223,11 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
             correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
         });
     }
+    for (const TrackSamples& drop : track_drops(window)) {
+        coded.tracks.push_back(quantise_track(drop, goal.quantiser, goal.origin, tables));
+        coded.decoded.push_back(dequantise_track(coded.tracks.back(), goal.quantiser, goal.origin, tables));
+    }
+    return coded;
 }
 
 std::vector<Path> survivors_of(const Window& window) {

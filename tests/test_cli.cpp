@@ -441,7 +441,7 @@ TEST_CASE("bench: no allocation in frames, one output whatever the order and the
     const nlohmann::json json = json_of(folder / "b.json");
     CHECK(json["allocations_in_frames"] == 0);
     CHECK(json["output_identical"] == true);
-    CHECK(json["passes"].size() == 6);
+    CHECK(json["passes"].size() == 10);
     CHECK(json["scaling"].size() == 2);
     CHECK(json["draco"]["triangles_per_second"].get<double>() > 0);
 }
