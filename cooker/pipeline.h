@@ -30,7 +30,6 @@ struct Path {
     bool continues = false;              ///< comes from the previous window
     int age = 0;                         ///< frames it has lived before this window's first
     Death cause = Death::none;           ///< set: is not carried on
-    int surplus = 0;                     ///< frames in a row that it was not needed
     float radius = 0;                    ///< of the local fit that places it, metres
     std::vector<SurfacePoint> at;        ///< on the smoothed source surface, death − birth + 1
     std::vector<float> correction;       ///< along the normal: what makes the decoded surface fit best, metres
