@@ -11,6 +11,7 @@
 namespace rill {
 namespace {
 
+constexpr float trusted_cells = 0.25f;    // patches and their crossings: farther apart, the patches may be wrong
 constexpr float cell_margin = 1 / 128.f;  // vertices keep off their cell's faces: no two coincide
 
 uint32_t corner_signs(const Tile& tile, uint32_t cell) {
@@ -156,9 +157,9 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
     const bool moving = m.input.velocity && m.input.target && m.input.target->velocity.data;
     float* velocity = moving ? s.velocity : nullptr;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
-        m.access.evaluate_gradient(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
+        m.access.evaluate_at_surface(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
                                    batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
-                                   velocity);
+                                   velocity, trusted_cells * tile.cell);
         for (uint32_t i = first; i < first + batch; ++i) {
             step(s, tile, i);
             const uint32_t slot = s.slot[i], vertex = first_vertex + slot;
