@@ -24,9 +24,9 @@ void slow_values(const rill::surface::Field& f, const uint32_t* c, uint32_t coun
 }
 void slow_gradients(const rill::surface::Field& f, const uint32_t* c, uint32_t count, const float* x, const float* y,
                     const float* z, uint32_t n, float* value, float* gx, float* gy, float* gz,
-                    float* velocity) noexcept {
+                    float* velocity, float distance) noexcept {
     simulated_us += 2 * us_per_position * n;
-    rill::surface::evaluate_gradient(f, c, count, x, y, z, n, value, gx, gy, gz, velocity);
+    rill::surface::evaluate_at_surface(f, c, count, x, y, z, n, value, gx, gy, gz, velocity, distance);
 }
 uint64_t simulated_clock(void*) { return uint64_t(simulated_us); }
 

@@ -311,6 +311,28 @@ TEST_CASE("candidates beyond reach and the cut into batches change no bit") {
     }
 }
 
+TEST_CASE("at the surface the blend stands; where it is far from zero it is asked and answered as elsewhere") {
+    Cloud cloud;
+    add(cloud, torus_of(1, 0.4), 0.12);
+    add(cloud, plane_of(1.5, 0.45, -1), 0.12);
+    const RealField real(cloud);
+    Random random(13);
+    size_t doubted = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const float x = float(3 * random() - 1.5), y = float(3 * random() - 1.5), z = float(1.4 * random() - 0.7);
+        const auto candidates = candidates_of(real.field, {{x, y, z}, {x, y, z}});
+        const auto count = uint32_t(candidates.size());
+        float all[4], near[4], blend[4];
+        surface::evaluate_gradient(real.field, candidates.data(), count, &x, &y, &z, 1, all, all + 1, all + 2, all + 3, nullptr);
+        surface::evaluate_at_surface(real.field, candidates.data(), count, &x, &y, &z, 1, near, near + 1, near + 2, near + 3, nullptr, 0.1f);
+        surface::evaluate_at_surface(real.field, candidates.data(), count, &x, &y, &z, 1, blend, blend + 1, blend + 2, blend + 3, nullptr, infinity);
+        const float* same = std::fabs(blend[0]) > 0.1f ? all : blend;
+        CHECK(std::memcmp(near, same, sizeof(near)) == 0);
+        doubted += all[0] != blend[0];
+    }
+    CHECK(doubted > 100);
+}
+
 TEST_CASE("every instruction set gives the bits of the scalar code") {
     Cloud cloud;
     add(cloud, torus_of(1, 0.4), 0.12);

@@ -53,7 +53,7 @@ void analytic(const surface::Field&, const uint32_t*, uint32_t, const float* x, 
 }
 void analytic_gradient(const surface::Field& f, const uint32_t* c, uint32_t count, const float* x, const float* y,
                        const float* z, uint32_t n, float* value, float* gx, float* gy, float* gz,
-                       float* velocity) noexcept {
+                       float* velocity, float) noexcept {
     analytic(f, c, count, x, y, z, n, value);
     for (uint32_t i = 0; i < n; ++i) {
         float* g[3] = {gx + i, gy + i, gz + i};

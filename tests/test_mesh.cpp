@@ -68,7 +68,7 @@ void random_grid(const surface::Field&, const uint32_t*, uint32_t, const float* 
     }
 }
 void no_gradient(const surface::Field&, const uint32_t*, uint32_t, const float*, const float*, const float*,
-                 uint32_t n, float* value, float* gx, float* gy, float* gz, float* velocity) noexcept {
+                 uint32_t n, float* value, float* gx, float* gy, float* gz, float* velocity, float) noexcept {
     for (uint32_t i = 0; i < n; ++i) value[i] = surface::unsupported, gx[i] = gy[i] = gz[i] = 0;
     for (uint32_t i = 0; velocity && i < 3 * n; ++i) velocity[i] = 0;
 }
@@ -101,7 +101,7 @@ void gyroid_values(const surface::Field&, const uint32_t*, uint32_t, const float
 }
 void gyroid_gradients(const surface::Field&, const uint32_t*, uint32_t, const float* x, const float* y,
                       const float* z, uint32_t n, float* value, float* gx, float* gy, float* gz,
-                      float* velocity) noexcept {
+                      float* velocity, float) noexcept {
     for (uint32_t i = 0; i < n; ++i) {
         const Vec p = {x[i], y[i], z[i]};
         float* g[3] = {gx + i, gy + i, gz + i};

@@ -11,6 +11,7 @@
 namespace rill {
 namespace {
 
+constexpr float trusted_cells = 0.25f;    // patches and their crossings: farther apart, the patches may be wrong
 constexpr float cell_margin = 1 / 128.f;  // vertices keep off their cell's faces: no two coincide
 
 uint32_t corner_signs(const Tile& tile, uint32_t cell) {
@@ -76,17 +77,18 @@ void for_surface_cells(const Tile& tile, Work work) {
 
 /// Corner values of a cell of a tile, from that of its lowest corner.
 constexpr uint32_t corner_offset[8] = {0, 1, 9, 10, 81, 82, 90, 91};
-/// An edge's lower corner.
 struct EdgePlace {
-    uint32_t axis, low, high;  ///< offsets of its ends
-    float corner[3];
+    uint32_t low, high;  ///< offsets of its ends
+    float corner[4];     ///< its lower end; and one, for counting
+    float along[4];
 };
 constexpr std::array<EdgePlace, 12> place_edges() {
     std::array<EdgePlace, 12> edges{};
     for (uint32_t e = 0; e < 12; ++e) {
         const uint32_t low = patches_detail::edge_corner(e);
-        edges[e] = {e / 4, corner_offset[low], corner_offset[low | 1u << e / 4],
-                    {float(low & 1), float(low >> 1 & 1), float(low >> 2)}};
+        edges[e] = {corner_offset[low], corner_offset[low | 1u << e / 4],
+                    {float(low & 1), float(low >> 1 & 1), float(low >> 2), 1},
+                    {float(e / 4 == 0), float(e / 4 == 1), float(e / 4 == 2), 0}};
     }
     return edges;
 }
@@ -99,19 +101,17 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
 /// Appends the patches of a cell to the batch: mean of their crossings.
 void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
     const float* value = corner_values(tile, cell);
-    float sum[4][3] = {}, crossings[4] = {};
+    float sum[4][4] = {};
     for_bits(patches.crossed, [&](uint32_t e) {
         const EdgePlace& edge = edge_places[e];
-        const float low = value[edge.low], high = value[edge.high];
-        const uint32_t p = patches.patch[e];
-        for (uint32_t a = 0; a < 3; ++a) sum[p][a] += edge.corner[a];
-        sum[p][edge.axis] += low / (low - high);
-        crossings[p] += 1;
+        const float low = value[edge.low], high = value[edge.high], crossing = low / (low - high);
+        float* total = sum[patches.patch[e]];
+        for (uint32_t a = 0; a < 4; ++a) total[a] += edge.corner[a] + crossing * edge.along[a];
     });
     const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     for (uint32_t p = 0; p < patches.count; ++p, ++n) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};
-        const float share = 1 / crossings[p];
+        const float share = 1 / sum[p][3];
         for (uint32_t a = 0; a < 3; ++a) {
             const float inside = std::clamp(sum[p][a] * share, cell_margin, 1 - cell_margin);
             *out[a] = (float(tile_cells * tile.coord[a] + int32_t(at[a])) + inside) * tile.cell;
@@ -156,9 +156,9 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
     const bool moving = m.input.velocity && m.input.target && m.input.target->velocity.data;
     float* velocity = moving ? s.velocity : nullptr;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
-        m.access.evaluate_gradient(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
+        m.access.evaluate_at_surface(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
                                    batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
-                                   velocity);
+                                   velocity, trusted_cells * tile.cell);
         for (uint32_t i = first; i < first + batch; ++i) {
             step(s, tile, i);
             const uint32_t slot = s.slot[i], vertex = first_vertex + slot;

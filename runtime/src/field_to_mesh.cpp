@@ -63,7 +63,7 @@ Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept {
     m->limits = completed(limits);
     carve(memory, m->limits, *m);
     m->hash_mask = hash_slots(m->limits.tiles) - 1;
-    m->access = {surface::gather, surface::evaluate, surface::evaluate_gradient};
+    m->access = {surface::gather, surface::evaluate, surface::evaluate_at_surface};
     return m;
 }
 

@@ -127,8 +127,8 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
             const float above = q.xx * r[0] * r[0] + q.yy * r[1] * r[1] + q.zz * r[2] * r[2] +
                                 q.xy * r[0] * r[1] + q.xz * r[0] * r[2] + q.yz * r[1] * r[2];
             const float middle = at[axis] + r[axis] + bend * above;
-            const int last = int(std::clamp(std::floor(middle + half), -1.f, 7.f));
-            cell[axis] = int(std::clamp(std::floor(middle - half), 0.f, 8.f));
+            const int last = int(std::clamp(middle + half + 1, 0.f, 8.f)) - 1;  // rounds down from −1 up
+            cell[axis] = int(std::clamp(middle - half, 0.f, 8.f));
             for (; cell[axis] <= last; ++cell[axis]) want(tile, cell);
         }
 }
@@ -193,16 +193,17 @@ void borrow_corners(const Mesher& m, Tile& tile) {
         const uint32_t index = find_tile(m, tile.level, coord);
         if (index == no_tile) continue;
         const Tile& from = m.tiles[index];
-        constexpr uint32_t step[3] = {1, 9, 81};
-        const uint32_t stride = step[face / 2], u = step[(face / 2 + 1) % 3], v = step[(face / 2 + 2) % 3];
-        const uint32_t ours = face & 1 ? 8 * stride : 0, theirs = face & 1 ? 0 : 8 * stride;
-        for (uint32_t k = 0; k < 81; ++k) {
-            const uint32_t at = k % 9 * u + k / 9 * v, to = ours + at, source = theirs + at;
-            if (!(from.known[source / 9] >> source % 9 & 1)) continue;
-            tile.value[to] = from.value[source];
-            tile.known[to / 9] |= uint16_t(1 << to % 9);
-            const uint32_t bit = 1u << to % 9, sign = (from.inside[source / 9] >> source % 9 & 1) << to % 9;
-            tile.inside[to / 9] = uint16_t((tile.inside[to / 9] & ~bit) | sign);  // sign and value stay one
+        const uint32_t axis = face / 2, far = face & 1 ? 8 : 0, near = 8 - far;
+        for (uint32_t k = 0; k < (axis == 0 ? 81u : 9u); ++k) {
+            const uint32_t step = axis == 0 ? 0 : axis == 1 ? 1 : 9, base = axis == 1 ? 9 * k : k;
+            const uint32_t to = base + far * step, source = base + near * step;
+            const auto ours = [&](uint32_t row) { return axis == 0 ? (row >> near & 1) << far : row; };
+            const uint32_t bits = ours(from.known[source]);
+            if (!bits) continue;
+            tile.known[to] |= uint16_t(bits);
+            tile.inside[to] = uint16_t((tile.inside[to] & ~bits) | (ours(from.inside[source]) & bits));
+            const float* value = from.value + 9 * source + (axis == 0 ? int32_t(near) - int32_t(far) : 0);
+            for_bits(bits, [&](uint32_t x) { tile.value[9 * to + x] = value[x]; });  // sign and value stay one
         }
     }
 }

@@ -7,6 +7,7 @@
 
 #include "cell_patches.h"
 #include "field_to_mesh.h"
+#include "surface/bits.h"
 
 namespace rill {
 
@@ -79,8 +80,8 @@ struct FieldAccess {
     uint32_t (*gather)(const surface::Field&, const surface::Box&, uint32_t*, uint32_t) noexcept;
     void (*evaluate)(const surface::Field&, const uint32_t*, uint32_t, const float*, const float*,
                      const float*, uint32_t, float*) noexcept;
-    void (*evaluate_gradient)(const surface::Field&, const uint32_t*, uint32_t, const float*, const float*,
-                              const float*, uint32_t, float*, float*, float*, float*, float*) noexcept;
+    void (*evaluate_at_surface)(const surface::Field&, const uint32_t*, uint32_t, const float*, const float*,
+                              const float*, uint32_t, float*, float*, float*, float*, float*, float) noexcept;
 };
 
 /// A place in the drawing order: coarse tiles before fine ones, of each level groups of 4³ tiles one after the
@@ -121,22 +122,6 @@ struct Mesher {
 };
 
 /// Tiles a task takes: a tile alone is too little work for an engine's job.
-/// Number of the lowest bit set.
-inline uint32_t lowest_bit(uint32_t bits) {
-#if defined(__GNUC__)
-    return uint32_t(__builtin_ctz(bits));
-#else
-    uint32_t n = 0;
-    for (; !(bits & 1); bits >>= 1) ++n;
-    return n;
-#endif
-}
-/// Work(number) for each bit set, lowest first.
-template <typename Work>
-void for_bits(uint32_t bits, Work&& work) {
-    for (; bits; bits &= bits - 1) work(lowest_bit(bits));
-}
-
 inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16;
 constexpr uint32_t tasks_of(uint32_t tiles, uint32_t per_task) { return (tiles + per_task - 1) / per_task; }
 /// Runs work(tile index in the list) for the tiles of one task.

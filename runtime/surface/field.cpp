@@ -225,12 +225,37 @@ struct Surroundings {
             place[close] = c;
             close += (d2[c] < bound) & (id[c] != i);
         }
+        if (found.count == 0 && close <= most_sorted) return take_sorted(close, found);
         for (uint32_t k = 0; k < close; ++k) {
             const uint32_t c = place[k];
             found.offer_any(d2[c]);
             if (agree[c] >= same_side) found.offer(id[c], d2[c]);
         }
     }
+    /// What offering them one by one comes to, without a branch that depends on distances: each one's rank is the number
+    /// of those before it, of equals the first listed.
+    void take_sorted(uint32_t close, Neighbours& found) const {
+        float key[most_sorted];
+        int32_t rank[most_sorted];
+        uint32_t order[most_sorted];
+        for (uint32_t k = 0; k < close; ++k) {
+            const float own = key[k] = d2[place[k]];
+            int32_t before = 0;
+            for (uint32_t j = 0; j < k; ++j) {
+                const int32_t first = key[j] <= own;
+                before += first, rank[j] += 1 - first;
+            }
+            rank[k] = before;
+        }
+        for (uint32_t k = 0; k < close; ++k) order[rank[k]] = place[k];
+        for (uint32_t k = 0; k < std::min(close, support_neighbour); ++k) found.any[k] = d2[order[k]];
+        for (uint32_t k = 0; k < close && found.count < most_neighbours; ++k) {
+            const uint32_t c = order[k];
+            found.id[found.count] = id[c], found.d2[found.count] = d2[c];
+            found.count += agree[c] >= same_side;
+        }
+    }
+    static constexpr uint32_t most_sorted = 64;
     float d2[capacity], agree[capacity];
     uint32_t place[capacity + 1];
     float guess = 1e30f;  ///< of the squared radius that holds all neighbours, from the last point; changes no result

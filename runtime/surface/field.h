@@ -97,5 +97,10 @@ void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate
 void evaluate_gradient(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
                        const float* x, const float* y, const float* z, uint32_t n, float* value,
                        float* gx, float* gy, float* gz, float* velocity) noexcept;
+/// The same for positions that are known to lie within `distance` of the surface: the winding number is only asked where
+/// the blend says otherwise.
+void evaluate_at_surface(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
+                         const float* x, const float* y, const float* z, uint32_t n, float* value,
+                         float* gx, float* gy, float* gz, float* velocity, float distance) noexcept;
 
 }  // namespace rill::surface

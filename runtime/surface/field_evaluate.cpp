@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surface/bits.h"
 #include "surface/field.h"
 #include "surface/field_kernels.h"
 #include "surface/field_rules.h"
@@ -12,6 +13,14 @@ namespace {
 
 constexpr uint32_t most_listed = 1024;  // patches that a batch may blend
 constexpr uint32_t chunk = most_reached;  // candidates looked at together
+
+/// Work(number) for each of the first n bits that is set, 16 to a word.
+template <typename Work>
+void for_bits(const uint32_t* words, uint32_t n, Work&& work) {
+    for (uint32_t first = 0; first < n; first += lanes)
+        rill::for_bits(words[first / lanes] & (n - first < lanes ? (1u << (n - first)) - 1 : ~0u),
+                       [&](uint32_t bit) { work(first + bit); });
+}
 
 /// What results go to; null: not wanted.
 struct Results {
@@ -32,11 +41,9 @@ public:
             const float* rows[7];
             for (int k = 0; k < 7; ++k) rows[k] = row_[k];
             const uint32_t n = std::min(chunk, count_ - first);
-            f_.kernels->reach(rows, n, box.lower, box.upper, least_);
-            for (uint32_t c = 0; c < n; ++c) {
-                out[std::min(found, most_listed - 1)] = candidates_[first + c];
-                found += least_[c] < 1;
-            }
+            uint32_t within[chunk / lanes];
+            f_.kernels->reach(rows, n, box.lower, box.upper, within);
+            for_bits(within, n, [&](uint32_t c) { out[std::min(found++, most_listed - 1)] = candidates_[first + c]; });
         }
         return found;
     }
@@ -53,7 +60,6 @@ private:
     const uint32_t* candidates_;
     uint32_t count_;
     float row_[7][chunk] = {};
-    float least_[chunk];
 };
 
 /// Positions whose sign the winding number decides: gathered from many batches, asked for together.
@@ -137,6 +143,7 @@ struct Evaluation {
     const Results& out;
     Shortlist& shortlist;
     Doubts& doubts;
+    float trusted_value;  ///< up to this, values are not doubted
     uint32_t list[most_listed];
     Batch batch;
 
@@ -158,7 +165,7 @@ struct Evaluation {
         std::copy(batch.value, batch.value + n, out.value + first);
         if (out.gx) write_slopes(count, n, first);
         int32_t any = 0;
-        for (uint32_t l = 0; l < lanes; ++l) any |= batch.doubt[l];
+        for (uint32_t l = 0; l < lanes; ++l) any |= batch.doubt[l] &= std::fabs(batch.value[l]) > trusted_value;
         for (uint32_t l = 0; any && f.point_count && l < n; ++l)
             if (batch.doubt[l]) doubts.add(batch, l, first + l);
     }
@@ -175,12 +182,12 @@ struct Evaluation {
 };
 
 void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, const float* x, const float* y,
-                  const float* z, uint32_t n, const Results& out) {
+                  const float* z, uint32_t n, float trusted_value, const Results& out) {
     const uint32_t points = uint32_t(std::lower_bound(candidates, candidates + count, f.point_count) - candidates);
     {
         Shortlist shortlist(f, candidates, points);
         Doubts doubts(f, out);
-        Evaluation evaluation{f, out, shortlist, doubts, {}, {}};
+        Evaluation evaluation{f, out, shortlist, doubts, trusted_value, {}, {}};
         for (uint32_t first = 0; first < n; first += lanes)
             evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
     }
@@ -201,7 +208,7 @@ uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity
         from[a] = int(std::clamp((box.lower[a] - f.largest_support - f.grid_origin[a]) / f.grid_cell - 0.01f, 0.f, size));
         to[a] = int(std::clamp((box.upper[a] + f.largest_support - f.grid_origin[a]) / f.grid_cell + 0.01f, -1.f, size - 1));
     }
-    float least[chunk];
+    uint32_t within[chunk / lanes];
     for (int z = from[2]; f.point_count && z <= to[2]; ++z)
         for (int y = from[1]; y <= to[1]; ++y) {
             const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
@@ -210,9 +217,8 @@ uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity
             for (uint32_t j = f.cell_start[row + uint32_t(from[0])]; j < last; j += chunk) {
                 const float* const rows[7] = {f.x + j, f.y + j, f.z + j, f.nx + j, f.ny + j, f.nz + j, f.steep + j};
                 const uint32_t n = std::min(chunk, last - j);
-                f.kernels->reach(rows, n, box.lower, box.upper, least);
-                for (uint32_t c = 0; c < n; ++c)
-                    if (least[c] < 1) take(j + c);
+                f.kernels->reach(rows, n, box.lower, box.upper, within);
+                for_bits(within, n, [&](uint32_t c) { take(j + c); });
             }
         }
     for (uint32_t d = 0; d < f.drop_count; ++d) {
@@ -229,14 +235,21 @@ uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity
 
 void evaluate(const Field& f, const uint32_t* candidates, uint32_t candidate_count, const float* x, const float* y,
               const float* z, uint32_t n, float* value) noexcept {
-    evaluate_all(f, candidates, candidate_count, x, y, z, n, {value, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr});
+    evaluate_all(f, candidates, candidate_count, x, y, z, n, -1, {value, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr});
 }
 
 void evaluate_gradient(const Field& f, const uint32_t* candidates, uint32_t candidate_count, const float* x,
                        const float* y, const float* z, uint32_t n, float* value, float* gx, float* gy, float* gz,
                        float* velocity) noexcept {
     float *vx = velocity, *vy = velocity ? velocity + n : nullptr, *vz = velocity ? velocity + 2 * n : nullptr;
-    evaluate_all(f, candidates, candidate_count, x, y, z, n, {value, gx, gy, gz, vx, vy, vz});
+    evaluate_all(f, candidates, candidate_count, x, y, z, n, -1, {value, gx, gy, gz, vx, vy, vz});
+}
+
+void evaluate_at_surface(const Field& f, const uint32_t* candidates, uint32_t candidate_count, const float* x,
+                         const float* y, const float* z, uint32_t n, float* value, float* gx, float* gy, float* gz,
+                         float* velocity, float distance) noexcept {
+    float *vx = velocity, *vy = velocity ? velocity + n : nullptr, *vz = velocity ? velocity + 2 * n : nullptr;
+    evaluate_all(f, candidates, candidate_count, x, y, z, n, distance, {value, gx, gy, gz, vx, vy, vz});
 }
 
 }  // namespace rill::surface

@@ -221,14 +221,17 @@ RILL_INLINE void winding(const Field& f, const float* x, const float* y, const f
     for (uint32_t l = 0; l < lanes; ++l) number[l] = discs.sum[l], distance2[l] = discs.nearest[l];
 }
 
+alignas(64) constexpr uint32_t bit_of_lane[lanes] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
+                                                    1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+
 /// Interval arithmetic in the very order in which the kernels compute u²: no point with weight anywhere in the box is
 /// missed, not even by rounding.
 RILL_INLINE void reach(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],
-                       float* least) {
+                       uint32_t* within) {
     for (uint32_t first = 0; first < n; first += lanes) {
         const float *px = point[0] + first, *py = point[1] + first, *pz = point[2] + first;
         const float *nx = point[3] + first, *ny = point[4] + first, *nz = point[5] + first, *inverse = point[6] + first;
-        alignas(64) float u2[lanes];
+        alignas(64) uint32_t bit[lanes];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float ax = lower[0] - px[l], ay = lower[1] - py[l], az = lower[2] - pz[l];
             const float bx = upper[0] - px[l], by = upper[1] - py[l], bz = upper[2] - pz[l];
@@ -237,17 +240,20 @@ RILL_INLINE void reach(const float* const point[7], uint32_t n, const float lowe
             const float low = lesser(lx, hx) + lesser(ly, hy) + lesser(lz, hz);
             const float high = greater(lx, hx) + greater(ly, hy) + greater(lz, hz);
             const float h = greater(greater(low, -high), 0);
-            u2[l] = (dx * dx + dy * dy + dz * dz + flatten * h * h) * inverse[l];
+            const float u2 = (dx * dx + dy * dy + dz * dz + flatten * h * h) * inverse[l];
+            bit[l] = u2 < 1 ? bit_of_lane[l] : 0u;
         }
-        std::memcpy(least + first, u2, sizeof(u2));
+        for (uint32_t l = 0; l < 8; ++l) bit[l] |= bit[l + 8];  // a sum in one loop would not become vectors
+        for (uint32_t l = 0; l < 4; ++l) bit[l] |= bit[l + 4];
+        within[first / lanes] = bit[0] | bit[1] | bit[2] | bit[3];
     }
 }
 
 // One set of entry points per instruction set; everything above is inlined into each.
 #define RILL_LEVEL(id, target)                                                                                 \
     target void reach_##id(const float* const point[7], uint32_t n, const float lower[3], const float upper[3], \
-                           float* least) {                                                                     \
-        reach(point, n, lower, upper, least);                                                                  \
+                           uint32_t* within) {                                                                 \
+        reach(point, n, lower, upper, within);                                                                 \
     }                                                                                                          \
     target void blend_##id(const Field& f, const uint32_t* list, uint32_t count, Batch& b) {                   \
         blend(f, list, count, b);                                                                              \

@@ -25,9 +25,10 @@ struct alignas(64) Slopes {
 
 struct Kernels {
     const char* name;
-    /// A lower bound of u² in the box for n ≤ most_reached points: rows x y z, nx ny nz, 1/R², read up to the
-    /// next multiple of `lanes`, as `least` is written.
-    void (*reach)(const float* const point[7], uint32_t n, const float lower[3], const float upper[3], float* least);
+    /// Which of n ≤ most_reached points may have weight in the box, 16 to a word: rows x y z, nx ny nz, 1/R², read up to
+    /// the next multiple of `lanes`; bits beyond n mean nothing.
+    void (*reach)(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],
+                  uint32_t* within);
     void (*blend)(const Field&, const uint32_t* list, uint32_t count, Batch&);
     void (*slope)(const Field&, const uint32_t* list, uint32_t count, const Batch&, bool velocity, Slopes&);
     /// Winding number of all points, and about the squared distance to the nearest.
