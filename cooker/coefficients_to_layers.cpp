@@ -18,6 +18,7 @@ constexpr float growth = 1.5f;         // of what is taken, from one round to th
 constexpr float room = 0.6f;           // of the distance to what was taken before: no two of a round are nearer
 constexpr size_t least_taken = 24;     // tracks in layer 0, where there are so many
 constexpr float least_share = 0.11f;   // of the cost: layer 0
+constexpr uint32_t drops_layer = 1;    // smaller than cells of layer 0
 
 /// All tracks alive at one looked-at frame.
 struct Look {
@@ -135,15 +136,15 @@ std::vector<uint32_t> assign_layers(const std::vector<TrackSamples>& tracks, con
         for (size_t i = 0; i < taken.size(); ++i)
             if (taken[i] && layer[i] == layers - 1) layer[i] = l;
     }
+    for (size_t i = 0; i < tracks.size(); ++i)
+        if (tracks[i].drop) layer[i] = std::min(drops_layer, layers - 1);
     return layer;
 }
 
-std::vector<uint32_t> assign_blocks(const Window& window, uint32_t most_tracks, uint32_t& block_count) {
-    std::vector<glm::vec3> mean(window.paths.size(), glm::vec3(0));
-    for (size_t i = 0; i < mean.size(); ++i) {
-        for (const SurfacePoint& p : window.paths[i].at) mean[i] += p.position;
-        mean[i] /= float(window.paths[i].at.size());
-    }
+std::vector<uint32_t> assign_blocks(const std::vector<TrackSamples>& tracks, uint32_t most_tracks, uint32_t& block_count) {
+    std::vector<glm::vec3> mean(tracks.size(), glm::vec3(0));
+    for (size_t i = 0; i < mean.size(); ++i)
+        for (const glm::vec3& p : tracks[i].position) mean[i] += p / float(tracks[i].position.size());
     std::vector<uint32_t> block(mean.size(), 0), ids(mean.size());
     std::iota(ids.begin(), ids.end(), 0u);
     block_count = 0;

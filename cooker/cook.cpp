@@ -13,6 +13,7 @@
 #include "output_file.h"
 #include "parallel.h"
 #include "parts_to_asset.h"
+#include "rate_search.h"
 #include "survey.h"
 
 namespace rill::cooker {
@@ -22,13 +23,14 @@ namespace {
 constexpr uint32_t most_tracks_per_block = 1500;
 constexpr int most_attempts = 3;
 constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
-constexpr double first_tolerance = 1.15;
+constexpr double first_tolerance = 1.15;     // of the error aimed at
+constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
     const float t = float(tolerance);
     goal.tolerance = t;
-    goal.quantiser = {0.3f * t, 3.f, 0.03f, 0.2f * t, 0.03f};
+    goal.quantiser = {0.3f * t, 3.f, 0.045f, 0.2f * t, 0.045f};
     goal.origin = facts.lower;
     goal.jobs = jobs;
     return goal;
@@ -39,12 +41,19 @@ void add(ChunkBits& sum, const ChunkBits& more) {
     sum.normals += more.normals, sum.drops += more.drops;
 }
 
-/// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches.
+/// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
 void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, float reach) {
     chunk.lower = glm::vec3(1e30f), chunk.upper = glm::vec3(-1e30f);
     for (const TrackSamples* track : tracks)
-        for (const glm::vec3& p : track->position)
-            chunk.lower = glm::min(chunk.lower, p - reach), chunk.upper = glm::max(chunk.upper, p + reach);
+        for (size_t k = 0; k < track->position.size(); ++k) {
+            const glm::vec3& p = track->position[k];
+            float wide = reach;
+            if (track->drop) {
+                const auto& s = track->shape[k];
+                wide = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+            }
+            chunk.lower = glm::min(chunk.lower, p - wide), chunk.upper = glm::max(chunk.upper, p + wide);
+        }
 }
 
 struct LayerError {
@@ -96,7 +105,7 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
     for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
     const std::vector<uint32_t> layer = assign_layers(coded.decoded, cost, window.samples(), layers, goal.jobs);
     uint32_t block_count = 0;
-    const std::vector<uint32_t> block = assign_blocks(window, most_tracks_per_block, block_count);
+    const std::vector<uint32_t> block = assign_blocks(coded.decoded, most_tracks_per_block, block_count);
     const std::vector<LayerError> errors = layer_errors(window, coded, layer, layers, goal.jobs);
     std::vector<ChunkToWrite> chunks(size_t(layers) * block_count);
     parallel_for(chunks.size(), goal.jobs, [&](size_t c) {
@@ -162,33 +171,55 @@ void move_file(const std::string& from, const std::string& to) {
 /// Cooks spans, each into a part of its own.
 class SpanCook {
 public:
-    SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan, const CookFacts& facts, double target)
-        : reader_(reader), settings_(settings), survey_(survey), plan_(plan), facts_(facts), target_(target) {
+    SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan, const CookFacts& facts, const Aim& aim)
+        : reader_(reader), settings_(settings), survey_(survey), plan_(plan), facts_(facts), aim_(aim) {
         tables_memory_.resize(format::basis_tables_bytes(uint32_t(settings.window) + 1) / sizeof(double) + 2);
         format::build_basis_tables(tables_, tables_memory_.data(), uint32_t(settings.window) + 1);
     }
 
-    /// Closed loop: the span is decoded by the runtime and measured; the tolerance follows. `done`: frames of the first attempt.
+    /// Closed loop: the tolerance follows what came of it. `done`: frames of the first attempt.
     void run(uint32_t span, const std::string& output, const std::function<void(uint32_t)>& done) const {
         const TemporaryFile candidate{output + ".cooking"}, best{output + ".best"};
-        const ChosenFrames judged(reader_, judged_frames_of(span));
-        SpanResult kept;
-        double tolerance = first_tolerance * target_, best_miss = HUGE_VAL;
-        for (int attempt = 1;; ++attempt) {
-            SpanResult result = cook(span, candidate.path, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
-            result.measured = verify(candidate.path, judged, settings_.jobs).totals;
-            const double ratio = result.measured.p99() / target_, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
-            if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate.path, best.path);
-            kept.attempts = attempt;
-            if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) break;
-            tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
-        }
+        const SpanResult kept = aim_.bytes > 0 ? within_rate(span, candidate.path, best.path, done) : at_error(span, candidate.path, best.path, done);
         AssetWriter writer(output);
         writer.append(read_directory(best.path), 0);
         write(writer, kept);
     }
 
 private:
+    /// Decoded by the runtime and measured after every attempt.
+    SpanResult at_error(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
+        const ChosenFrames judged(reader_, judged_frames_of(span));
+        SpanResult kept;
+        double tolerance = first_tolerance * aim_.p99, best_miss = HUGE_VAL;
+        for (int attempt = 1;; ++attempt) {
+            SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
+            result.measured = verify(candidate, judged, settings_.jobs).totals;
+            const double ratio = result.measured.p99() / aim_.p99, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
+            if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate, best);
+            kept.attempts = attempt;
+            if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) return kept;
+            tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
+        }
+    }
+    /// Every span may have the bytes of its time: what bytes there are tells at once, so only the last is measured.
+    SpanResult within_rate(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
+        const std::vector<double>& seconds = reader_.info().seconds;
+        const double all = seconds.back() - seconds.front(), own = seconds[plan_.last(span)] - seconds[plan_.first(span)];
+        const double allowed = aim_.bytes * (all > 0 ? own / all : 1);
+        RateSearch search(usual_tolerance * survey_.edge, finest_tolerance * survey_.edge, coarsest_tolerance * survey_.diagonal());
+        SpanResult kept;
+        int attempts = 0;
+        while (const std::optional<double> tolerance = search.next()) {
+            SpanResult result = cook(span, candidate, *tolerance, [&](uint32_t frames) { if (attempts == 0) done(frames); });
+            if (search.add(*tolerance, bytes_in_asset(facts_, read_directory(candidate), result) / allowed))
+                kept = std::move(result), move_file(candidate, best);
+            kept.attempts = ++attempts;
+        }
+        kept.measured = verify(best, ChosenFrames(reader_, judged_frames_of(span)), settings_.jobs).totals;
+        return kept;
+    }
+
     /// Evenly spread, as many of every span, so that spans weigh what they are; the border frame is the next span's.
     std::vector<size_t> judged_frames_of(uint32_t span) const {
         const uint32_t nominal = std::min(plan_.length(), plan_.frames), stride = (nominal + judged_frames - 1) / judged_frames;
@@ -210,7 +241,7 @@ private:
         std::vector<Path> survivors;
         std::shared_ptr<const SurfaceFrame> border;
         for (uint32_t first = begin;; first += plan_.window) {
-            Window window = load(first, std::min(end, first + plan_.window), border);
+            Window window = load(first, std::min(end, first + plan_.window), border, float(tolerance));
             window.opens_span = first == begin;
             const uint32_t last = first + uint32_t(window.samples()) - 1;
             grow_tracks(window, survivors, goal);
@@ -231,14 +262,19 @@ private:
         writer.finish(facts);
     }
 
-    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border) const {
+    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border, float tolerance) const {
         Window window;
         window.first = int(first);
         window.frames.resize(last - first + 1);
         for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
         parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
-            window.frames[s] = s == 0 && border ? border
-                                                : std::make_shared<SurfaceFrame>(reader_.read(first + s), survey_.edge);
+            if (s == 0 && border) {
+                window.frames[s] = border;
+                return;
+            }
+            Mesh mesh = reader_.read(first + s);
+            std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
+            window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
         });
         return window;
     }
@@ -248,7 +284,7 @@ private:
     const Survey& survey_;
     const SpanPlan& plan_;
     const CookFacts& facts_;
-    double target_;
+    Aim aim_;
     format::BasisTables tables_{};
     std::vector<double> tables_memory_;
 };
@@ -259,12 +295,15 @@ void check(const CookSettings& settings) {
     if (settings.layers < 1 || settings.layers > int(format::max_layers))
         throw UsageError("layers must be 1 to " + std::to_string(format::max_layers));
     if (settings.segments > 0 && settings.segment >= settings.segments) throw UsageError("--segment I/N needs I from 1 to N");
-    error_target(settings.error, 1, 1);
+    aim_of(settings.error, settings.bitrate, 1, 1, 1);
 }
 
 /// What decides every byte of the asset, but for the input's content.
 nlohmann::json decisive_settings(const CookSettings& settings) {
-    return {{"error", settings.error}, {"window", settings.window}, {"layers", settings.layers}, {"read", read_settings(settings.read)}};
+    nlohmann::json all = {{"window", settings.window}, {"layers", settings.layers}, {"read", read_settings(settings.read)}};
+    if (settings.bitrate > 0) all["bitrate"] = settings.bitrate;
+    else all["error"] = settings.error;
+    return all;
 }
 
 std::unique_ptr<SequenceReader> open_input(const std::string& input, const CookSettings& settings) {
@@ -359,16 +398,24 @@ private:
     const std::function<void(const std::string&)>& warn_;
 };
 
+/// n frames last n times their mean distance, in seconds.
+double duration(const SequenceInfo& info) {
+    const double n = double(info.seconds.size()), between = info.seconds.back() - info.seconds.front();
+    return n > 1 && between > 0 ? between * n / (n - 1) : n / info.frames_per_second;
+}
+
 /// What every part and the asset say of the cook.
-nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Survey& survey, double target) {
+nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Survey& survey, const Aim& aim) {
     const SequenceInfo& info = job.reader->info();
     const double frames = double(info.numbers.size());
+    nlohmann::json target = {{"p99_metres", aim.p99}};
+    if (aim.bytes > 0) target = {{"kilobits_per_second", settings.bitrate}, {"file_bytes", aim.bytes}};
     return {{"generator", "rill cook"},
             {"tool", RILL_VERSION},
             {"key", job.key},
             {"span_count", job.plan.spans()},
             {"settings", decisive_settings(settings)},
-            {"target", {{"p99_metres", target}}},
+            {"target", target},
             {"source",
              {{"format", info.format}, {"frames", info.numbers.size()}, {"first_frame", info.numbers.front()},
               {"frames_per_second", info.frames_per_second}, {"raw_bytes", info.raw_bytes},
@@ -378,8 +425,8 @@ nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Sur
 
 CookReport report_of(const Linked& linked, bool up_to_date) {
     CookReport report;
-    report.json = linked.report, report.up_to_date = up_to_date, report.target_met = linked.target_met;
-    report.target_p99 = linked.target_p99, report.measured_p99 = linked.measured_p99;
+    static_cast<Verdict&>(report) = linked;
+    report.json = linked.report, report.up_to_date = up_to_date;
     return report;
 }
 
@@ -392,7 +439,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     CookReport report;
     report.is_part = as_part;
     if (const nlohmann::json stored = settings.force ? nlohmann::json() : job.finished(output, as_part); !stored.is_null()) {
-        if (!as_part) return report_of(judge(stored), true);
+        if (!as_part) return report_of(judge(stored, fs::file_size(output)), true);
         report.json = stored, report.up_to_date = report.target_met = true;
         return report;
     }
@@ -406,11 +453,11 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     const uint32_t frames = job.plan.frames;
     const Survey survey = survey_input(*job.reader, settings.read, settings.survey, job.input_hash, settings.jobs,
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
-    const double target = error_target(settings.error, survey.edge, survey.diagonal());
-    const CookFacts facts = {cook_json(job, settings, survey, target), job.reader->info().frames_per_second, uint32_t(settings.layers),
+    const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, survey.diagonal(), duration(job.reader->info()));
+    const CookFacts facts = {cook_json(job, settings, survey, aim), job.reader->info().frames_per_second, uint32_t(settings.layers),
                              survey.edge, survey.lower, survey.upper};
     const auto reader = apply_fit(std::move(job.reader), survey.fit);
-    const SpanCook spans(*reader, settings, survey, job.plan, facts, target);
+    const SpanCook spans(*reader, settings, survey, job.plan, facts, aim);
     const uint32_t begin = job.plan.first(job.share.first), end = job.plan.last(job.share.end - 1);
     std::vector<std::string> parts;
     for (uint32_t span = job.share.first; span < job.share.end; ++span) {

@@ -9,11 +9,13 @@
 #include "check_velocity.h"
 #include "readers/reader.h"
 #include "spans.h"
+#include "verdict.h"
 
 namespace rill::cooker {
 
 struct CookSettings {
     std::string error = "0.25e";   ///< p99 aimed at: "0.25e" median edges, "0.1%" of the diagonal, "2mm", "0.002m"
+    double bitrate = 0;            ///< 1000 bits per second, > 0: the best error within this rate, instead of `error`
     int window = 24;               ///< frames a window spans (it touches one more)
     int jobs = 0;                  ///< 0: all cores
     int layers = 4;
@@ -27,12 +29,10 @@ struct CookProgress {
     uint32_t frames_done, frames_total;
     std::string stage;
 };
-struct CookReport {
+struct CookReport : Verdict {
     nlohmann::json json;           ///< stable, documented in REPORTS.md
     bool up_to_date = false;       ///< the output was there already, of this very input and settings
     bool is_part = false;          ///< the figures are those of this part
-    bool target_met = false;
-    double target_p99 = 0, measured_p99 = 0;  ///< metres
 };
 /// Cooks `input` into `output`. Throws InputError, UsageError. Deterministic: the same input and settings give the same bytes
 /// at any number of jobs and segments. Spans that are finished when it fails or is stopped are kept beside `output`, in a

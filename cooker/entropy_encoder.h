@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/chunk_model.h"
+
 namespace rill::cooker {
 
 class RangeEncoder {
 public:
     /// Appends to `bytes`. `spent` counts bits by category (format::BitCategory).
-    RangeEncoder(std::vector<uint8_t>& bytes, double (&spent)[5]) : bytes_(bytes), spent_(spent) {}
+    RangeEncoder(std::vector<uint8_t>& bytes, double (&spent)[format::bit_categories]) : bytes_(bytes), spent_(spent) {}
 
     uint32_t bit(uint32_t probability, uint32_t value) {
         const uint32_t bound = uint32_t((uint64_t(range_) * probability) >> 16);
@@ -43,7 +45,7 @@ private:
         low_ = (low_ & 0xffffffu) << 8;
     }
     std::vector<uint8_t>& bytes_;
-    double (&spent_)[5];
+    double (&spent_)[format::bit_categories];
     uint64_t low_ = 0;
     uint32_t range_ = 0xffffffffu;
     int category_ = 0;

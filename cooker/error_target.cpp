@@ -19,4 +19,10 @@ double error_target(const std::string& text, double median_edge, double diagonal
     return value * scale;
 }
 
+Aim aim_of(const std::string& error, double kilobits, double median_edge, double diagonal, double seconds) {
+    if (kilobits == 0) return {error_target(error, median_edge, diagonal), 0};
+    if (!(kilobits > 0) || !std::isfinite(kilobits)) throw UsageError("--bitrate must be a number of kilobits per second above 0");
+    return {0, kilobits * 1000 / 8 * seconds};
+}
+
 }  // namespace rill::cooker

@@ -11,7 +11,7 @@ namespace rill::cooker {
 namespace {
 
 constexpr float coarsest = 8;    // spacing of the first points on bare surface, in edges
-constexpr float finest = 2.0f;   // no two points closer, in edges
+constexpr float finest = 2.2f;   // no two points closer, in edges
 constexpr float same_side = 0.3f;
 
 uint32_t scramble(uint32_t x) {

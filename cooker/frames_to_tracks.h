@@ -15,7 +15,7 @@ struct WindowGoal {
     int jobs = 0;
 };
 struct CodedWindow {
-    std::vector<QuantisedTrack> tracks;   ///< parallel to Window::paths
+    std::vector<QuantisedTrack> tracks;   ///< of Window::paths, in their order; then the drops
     std::vector<TrackSamples> decoded;    ///< what each decodes to
 };
 

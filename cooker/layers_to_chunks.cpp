@@ -132,7 +132,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
     block.coefficient_count = out.shape.coefficient_count;
     block.tracks = records.data(), block.coefficients = coefficients.data();
 
-    double spent[5] = {};
+    double spent[format::bit_categories] = {};
     RangeEncoder coder(out.bytes, spent);
     const auto learned = std::make_unique<format::Statistics>();
     const auto model = std::make_unique<Model>(coder, steps, window_samples, *learned, block);
@@ -149,7 +149,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
             throw InputError(std::string("chunk: cannot be coded: ") + model->reason);
     }
     coder.finish();
-    out.bits = {spent[format::bits_structure], spent[format::bits_births], spent[format::bits_motion],
+    out.bits = {spent[format::bits_structure], spent[format::bits_births] + spent[format::bits_first], spent[format::bits_motion],
                 spent[format::bits_normals], spent[format::bits_drops]};
     return out;
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "pipeline.h"
+#include "rate_search.h"
 
 namespace rill::cooker {
 namespace {
@@ -185,7 +186,21 @@ std::string part_settings(const CookFacts& facts, const std::vector<SpanResult>&
     return settings.dump();
 }
 
-Linked judge(const json& stored) {
+double bytes_in_asset(const CookFacts& facts, const AssetDirectory& part, const SpanResult& span) {
+    const json settings = asset_settings(facts, {span}, span);
+    double common = double(settings.dump().size());
+    // What is measured only when the span is done will have all its digits.
+    constexpr double digits = 20;
+    for (const json& value : settings.at("measured"))
+        if (span.measured.area == 0 && !value.is_number_integer()) common += digits - double(value.dump().size());
+    const double own = double(settings.at("spans").at(0).dump().size()), spans = facts.cook.at("span_count");
+    const double tables = double(part.header.directory_bytes - part.header.settings_bytes);
+    double chunks = 0;
+    for (const format::ChunkRecord& chunk : part.chunks) chunks += chunk.bytes;
+    return chunks + tables + own + (format::header_bytes + common - own) / spans;
+}
+
+Linked judge(const json& stored, uint64_t file_bytes) {
     Linked linked;
     linked.report = stored;
     const auto number = [&](const char* pointer) {
@@ -194,6 +209,13 @@ Linked judge(const json& stored) {
     };
     linked.target_p99 = number("/target/p99_metres"), linked.measured_p99 = number("/measured/p99_m");
     linked.target_met = linked.measured_p99 <= (1 + met_within) * linked.target_p99;
+    if (const double allowed = number("/target/file_bytes"); allowed < HUGE_VAL) {
+        const double used = double(file_bytes) / allowed;
+        linked.target_p99 = 0, linked.target_kbps = number("/target/kilobits_per_second"), linked.measured_kbps = used * linked.target_kbps;
+        const double finest = 1.001 * finest_tolerance * number("/source/median_edge_metres");
+        const bool all_finest = std::ranges::all_of(stored.at("spans"), [&](const json& span) { return span.at("tolerance_m") <= finest; });
+        linked.target_met = used <= 1 + rate_met_within && (used >= 1 - rate_met_within || all_finest);
+    }
     return linked;
 }
 
@@ -211,7 +233,7 @@ Linked link_asset(const std::vector<std::string>& paths, const std::string& outp
     const json settings = asset_settings(joined.facts, joined.spans, joined.all);
     facts.settings_json = settings.dump();
     writer.finish(facts);
-    return judge(json::parse(facts.settings_json));
+    return judge(json::parse(facts.settings_json), std::filesystem::file_size(output));
 }
 
 void link_part(const std::vector<std::string>& paths, const std::string& output) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "chunks_to_asset.h"
+#include "verdict.h"
 #include "verify.h"
 
 namespace rill::cooker {
@@ -44,16 +45,16 @@ struct CookFacts {
 };
 /// Header facts for these frames; even times are stored as a rate.
 AssetFacts asset_facts(const CookFacts& facts, const std::vector<int>& numbers, const std::vector<double>& seconds);
+/// What a span that is alone in `part` adds to the asset, with its share of header and settings.
+double bytes_in_asset(const CookFacts& facts, const AssetDirectory& part, const SpanResult& span);
 /// Settings text of a part.
 std::string part_settings(const CookFacts& facts, const std::vector<SpanResult>& spans, const std::vector<int>& numbers);
 
-struct Linked {
+struct Linked : Verdict {
     nlohmann::json report;            ///< stable, see REPORTS.md; stored in the asset
-    double target_p99 = 0, measured_p99 = 0;  ///< metres
-    bool target_met = false;
 };
-/// Measured against target, out of the JSON that an asset stores.
-Linked judge(const nlohmann::json& stored);
+/// Measured against target, out of the JSON that an asset stores, and the size of its file.
+Linked judge(const nlohmann::json& stored, uint64_t file_bytes);
 inline constexpr double met_within = 0.1;  // of the target
 
 /// All spans of the cook, from parts in any order, into the finished asset. Empty files are segments without spans.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // All stages of the cook, top to bottom, with what passes between them. One window at a time:
 //
+//   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids
 //   frames_to_samples      where the surface decoded so far is wrong, new points are born
 //   samples_to_tracks      points are carried through the window's frames, both ways, held to the surface
 //   tracks_to_surface      what the tracks decode to, measured at every source vertex; corrections
@@ -29,7 +30,6 @@ struct Path {
     bool continues = false;              ///< comes from the previous window
     int age = 0;                         ///< frames it has lived before this window's first
     Death cause = Death::none;           ///< set: is not carried on
-    int surplus = 0;                     ///< frames in a row that it was not needed
     float radius = 0;                    ///< of the local fit that places it, metres
     std::vector<SurfacePoint> at;        ///< on the smoothed source surface, death − birth + 1
     std::vector<float> correction;       ///< along the normal: what makes the decoded surface fit best, metres
@@ -47,6 +47,11 @@ struct Window {
     std::vector<Path> paths;
     int samples() const { return int(frames.size()); }
 };
+
+/// Takes the pieces that are ellipsoids within the tolerance (metres) out of a mesh.
+std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance);
+/// Their tracks over the window. Those at its first and last sample go on in the windows beside it, which see the same frame.
+std::vector<TrackSamples> track_drops(const Window& window);
 
 /// What a set of points means at the vertices of a frame.
 struct Residual {
@@ -87,6 +92,6 @@ void correct_paths(const SurfaceFrame& frame, const Residual& residual, const st
 std::vector<uint32_t> assign_layers(const std::vector<TrackSamples>& tracks, const std::vector<float>& cost, int samples,
                                     uint32_t layers, int jobs);
 /// Block of every track: a median split of the mean positions, at most 2^splits blocks.
-std::vector<uint32_t> assign_blocks(const Window& window, uint32_t most_tracks, uint32_t& block_count);
+std::vector<uint32_t> assign_blocks(const std::vector<TrackSamples>& tracks, uint32_t most_tracks, uint32_t& block_count);
 
 }  // namespace rill::cooker

@@ -103,8 +103,8 @@ void VertexTree::within(const glm::vec3& x, float radius, std::vector<Found>& ou
     std::sort(out.begin(), out.end(), [](const Found& a, const Found& b) { return a.vertex < b.vertex; });
 }
 
-SurfaceFrame::SurfaceFrame(Mesh source, float edge_length)
-    : mesh(std::move(source)), area(vertex_areas(mesh)), tree(mesh.positions), index(mesh), edge(edge_length) {
+SurfaceFrame::SurfaceFrame(Mesh source, float edge_length, std::vector<Drop> pieces)
+    : mesh(std::move(source)), drops(std::move(pieces)), area(vertex_areas(mesh)), tree(mesh.positions), index(mesh), edge(edge_length) {
     if (mesh.normals.empty()) mesh.normals = vertex_normals(mesh);
     group_vertices(*this, 6 * edge);
     place_probes(*this);

@@ -32,6 +32,13 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
+/// A small closed piece of liquid, as the ellipsoid {centre + S u : |u| = 1}.
+struct Drop {
+    glm::vec3 centre{}, velocity{};
+    std::array<float, 6> shape{};   ///< S: xx yy zz xy xz yz, metres
+    float volume = 0;               ///< m³
+};
+
 /// Places beside the surface whose side is known: where the decoded surface must not be.
 struct Probe {
     glm::vec3 position;
@@ -46,8 +53,9 @@ struct VertexGroup {
 };
 
 struct SurfaceFrame {
-    explicit SurfaceFrame(Mesh mesh, float edge);
-    Mesh mesh;                      ///< normals filled in
+    explicit SurfaceFrame(Mesh mesh, float edge, std::vector<Drop> drops = {});
+    Mesh mesh;                      ///< normals filled in; without the drops
+    std::vector<Drop> drops;
     std::vector<float> area;        ///< per vertex, m²
     std::vector<uint32_t> order;    ///< vertices, grouped
     std::vector<VertexGroup> groups;

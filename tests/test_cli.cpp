@@ -54,6 +54,29 @@ const Clip& clip() {
     return clip;
 }
 
+/// Every byte is accounted for, once, and each layer's are those of its chunks and their records.
+void check_bytes(const std::string& asset) {
+    const nlohmann::json json = nlohmann::json::parse(run_rill("info --json " + asset).text, nullptr, false);
+    REQUIRE(json.is_object());
+    const nlohmann::json& bytes = json["bytes"];
+    uint64_t all = 0;
+    for (const auto& [kind, value] : bytes.items()) all += value.is_number() ? value.get<uint64_t>() : 0;
+    REQUIRE(bytes["layers"].size() == json["layers"].size());
+    for (size_t l = 0; l < bytes["layers"].size(); ++l) {
+        CAPTURE(l);
+        const nlohmann::json &kinds = bytes["layers"][l], &layer = json["layers"][l];
+        const uint64_t chunks = layer["chunks"];
+        uint64_t sum = 0;
+        for (const auto& [kind, value] : kinds.items()) sum += value.get<uint64_t>();
+        CHECK(sum == layer["bytes"].get<uint64_t>() + 72 * chunks);
+        CHECK(kinds["heads"] == 22 * chunks);
+        CHECK(kinds["padding"] <= chunks);  // less than a byte each
+        all += sum;
+    }
+    CHECK(all == fs::file_size(asset));
+    CHECK(bytes["unused"] == 0);
+}
+
 }  // namespace
 
 TEST_CASE("usage: help is 0, mistakes are 1 and name the option") {
@@ -135,6 +158,60 @@ TEST_CASE("cook: a recipe, over which the command line goes") {
     CHECK(missed.code == 3);
     CHECK(has(missed, "bytes_per_frame"));
     CHECK(!has(missed, "normal_degrees"));
+}
+
+TEST_CASE("cook: a rate is met within 3 %, by the best error that it allows") {
+    const TestFolder folder;
+    const std::string input = RILL_CONTENT "/drop_splash", few = " --frames 20:24 --window 4 ";
+    const auto cook = [&](const std::string& rate, const std::string& asset, const std::string& more) {
+        return run_rill("cook " + input + few + "-o " + (folder / asset) + " --bitrate " + rate + " " + more);
+    };
+    double p99[2];
+    for (int i = 0; i < 2; ++i) {
+        const int rate = i ? 400 : 250;
+        const Result result = cook(std::to_string(rate), "a.rill", "--jobs 1 --quiet --report " + (folder / "a.json"));
+        CAPTURE(result.text);
+        CHECK(result.code == 0);
+        CHECK(double(fs::file_size(folder / "a.rill")) * 8 / 1000 / (5 / 24.0) == doctest::Approx(rate).epsilon(0.03));
+        const nlohmann::json report = json_of(folder / "a.json");
+        CHECK(report["settings"]["bitrate"] == rate);
+        CHECK(!report["settings"].contains("error"));
+        CHECK(report["target"]["kilobits_per_second"] == rate);
+        CHECK(report["spans"][0]["attempts"] <= 6);
+        p99[i] = report["measured"]["p99_m"];
+        if (i) continue;
+        // The same on three threads, and by a recipe; known when there already.
+        put_file(folder / "r.json", R"({"window": 4, "frames": "20:24", "output": "b.rill", "bitrate": 250, "jobs": 3})");
+        CHECK(run_rill("cook " + input + " --quiet --recipe " + (folder / "r.json")).code == 0);
+        CHECK(get_file(folder / "b.rill") == get_file(folder / "a.rill"));
+        const Result again = cook("250", "a.rill", "");
+        CHECK(again.code == 0);
+        CHECK(has(again, "up to date"));
+        CHECK(has(again, "kbit/s, aimed at 250 kbit/s"));
+    }
+    CHECK(p99[1] < p99[0]);
+    check_bytes(folder / "a.rill");
+}
+
+TEST_CASE("cook: a rate that cannot be met, and one beside an error") {
+    const TestFolder folder;
+    const std::string cook = "cook " + clip().input + " --window 3 -o " + (folder / "a.rill") + " ", recipe = folder / "r.json";
+    const Result missed = run_rill(cook + "--quiet --bitrate 1");  // less than the directory takes
+    CHECK(missed.code == 3);
+    CHECK(has(missed, "target missed: the rate is"));
+    CHECK(fs::remove(folder / "a.rill"));
+    const Result both = run_rill(cook + "--error 1e --bitrate 100");
+    CHECK(both.code == 1);
+    CHECK(has(both, "--error excludes --bitrate"));
+    CHECK(run_rill(cook + "--bitrate -1").code == 1);
+    put_file(recipe, R"({"error": "1e", "bitrate": 100})");
+    const Result in_recipe = run_rill(cook + "--recipe " + recipe);
+    CHECK(in_recipe.code == 1);
+    CHECK(has(in_recipe, "r.json: 'bitrate' stands in place of 'error'"));
+    CHECK(!fs::exists(folder / "a.rill"));
+    put_file(recipe, R"({"bitrate": 100})");  // on the command line either goes before both
+    CHECK(run_rill(cook + "--quiet --error 0.4e --recipe " + recipe).code == 0);
+    CHECK(get_file(folder / "a.rill") == get_file(clip().asset));
 }
 
 TEST_CASE("cook: bad input is 2, one line, and no asset") {
@@ -237,6 +314,8 @@ TEST_CASE("info") {
     CHECK(json["first_frame"] == 3);
     CHECK(json["file_bytes"] == fs::file_size(clip().asset));
     CHECK(json["windows"].size() >= 2);
+    check_bytes(clip().asset);
+    for (const char* kind : {"heads", "structure", "births", "first_coefficients", "motion", "normals"}) CHECK(json["bytes"]["layers"][0][kind] > 0);
 }
 
 TEST_CASE("assets that are none: 2, whatever the command") {
@@ -362,7 +441,7 @@ TEST_CASE("bench: no allocation in frames, one output whatever the order and the
     const nlohmann::json json = json_of(folder / "b.json");
     CHECK(json["allocations_in_frames"] == 0);
     CHECK(json["output_identical"] == true);
-    CHECK(json["passes"].size() == 6);
+    CHECK(json["passes"].size() == 10);
     CHECK(json["scaling"].size() == 2);
     CHECK(json["draco"]["triangles_per_second"].get<double>() > 0);
 }

@@ -511,3 +511,23 @@ TEST_CASE("fading: the surface moves smoothly while a point comes and goes") {
     INFO("largest step ", largest_step / h, ", last ", last_step / h, " spacings");
     CHECK(largest_step < 0.03 * h);
 }
+
+TEST_CASE("fading: what a point alone covers goes little by little") {
+    Cloud cloud;
+    add(cloud, sphere_of(1), 0.15);
+    const Vec apart = {0, 0, 2.2};
+    cloud.add(apart, {0, 0, 1});
+    double reach = infinity, whole = 0;
+    for (const double activity : {1.0, 0.3, 0.1, 0.01, 0.001}) {
+        cloud.activity.back() = float(activity);
+        const RealField real(cloud);
+        double support = 0;
+        for (uint32_t i = 0; i < real.field.point_count; ++i)
+            if (real.field.source[i] == cloud.activity.size() - 1) support = real.field.support[i];
+        CHECK(support > 0);
+        CHECK(support < 0.8 * reach);
+        reach = support;
+        if (activity == 1) whole = support;
+    }
+    CHECK(reach < 0.05 * whole);
+}

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "readers/reader.h"
+#include "verdict.h"
 
 namespace rill::cooker {
 
@@ -55,7 +56,7 @@ private:
 };
 
 /// Size and error of a finished asset, and the exit code that follows.
-int tell_target(const std::string& asset, double target_p99, double measured_p99, bool met, bool quiet);
+int tell_target(const std::string& asset, const Verdict& verdict, bool quiet);
 /// A recipe (RECIPES.md) holds the settings of one `rill cook`; what stands on the command line goes before it. Paths are
 /// relative to the recipe. Returns its further targets. Throws InputError, UsageError.
 std::map<std::string, double> apply_recipe(const std::string& path, CLI::App& command);

@@ -94,19 +94,24 @@ int cook_command(CookOptions& options, CLI::App& command) {
     if (!options.quiet && report.up_to_date)
         std::printf("%s: up to date: the same input, settings and tool; --force cooks anew\n", options.output.c_str());
     if (report.is_part) return exit_done;  // judged when all parts are linked
-    const int code = tell_target(options.output, report.target_p99, report.measured_p99, report.target_met, options.quiet);
+    const int code = tell_target(options.output, report, options.quiet);
     return std::max(code, judge_targets(targets, options.output, report.json));
 }
 
 }  // namespace
 
-int tell_target(const std::string& asset, double target_p99, double measured_p99, bool met, bool quiet) {
-    if (!quiet)
-        std::printf("%s: %s; p99 error %.4g m, aimed at %.4g m\n", asset.c_str(), readable_bytes(double(std::filesystem::file_size(asset))).c_str(),
-                    measured_p99, target_p99);
-    if (met) return exit_done;
-    std::fprintf(stderr, "rill: %s: target missed: p99 error is %.4g m, %.2f times the %.4g m aimed at\n", asset.c_str(), measured_p99,
-                 measured_p99 / target_p99, target_p99);
+int tell_target(const std::string& asset, const Verdict& v, bool quiet) {
+    const bool rate = v.target_kbps > 0;
+    if (!quiet) {
+        std::printf("%s: %s; p99 error %.4g m", asset.c_str(), readable_bytes(double(std::filesystem::file_size(asset))).c_str(), v.measured_p99);
+        if (rate) std::printf("; %.4g kbit/s, aimed at %.4g kbit/s\n", v.measured_kbps, v.target_kbps);
+        else std::printf(", aimed at %.4g m\n", v.target_p99);
+    }
+    if (v.target_met) return exit_done;
+    const double measured = rate ? v.measured_kbps : v.measured_p99, target = rate ? v.target_kbps : v.target_p99;
+    const char* unit = rate ? "kbit/s" : "m";
+    std::fprintf(stderr, "rill: %s: target missed: %s is %.4g %s, %.2f times the %.4g %s aimed at\n", asset.c_str(), rate ? "the rate" : "p99 error",
+                 measured, unit, measured / target, target, unit);
     return exit_target_missed;
 }
 
@@ -115,7 +120,8 @@ void add_cook(CLI::App& app, Run& run) {
     CLI::App* command = app.add_subcommand("cook", "Cook a fluid mesh sequence into an asset");
     options->input.add_to(*command)->required(false);
     command->add_option("-o,--output", options->output, "The asset, .rill");
-    command->add_option("--error", options->settings.error, "p99 error aimed at: 0.25e (edges), 0.1% (of the diagonal), 2mm")->capture_default_str();
+    CLI::Option* error = command->add_option("--error", options->settings.error, "p99 error aimed at: 0.25e (edges), 0.1% (of the diagonal), 2mm")->capture_default_str();
+    command->add_option("--bitrate", options->settings.bitrate, "Kilobits per second: the best error within this rate, instead of --error")->check(CLI::PositiveNumber)->excludes(error);
     command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive");
     command->add_option("--window", options->settings.window, "Frames per window")->check(CLI::Range(1, 64))->capture_default_str();
     command->add_option("--layers", options->settings.layers, "Layers of detail")->check(CLI::Range(1, 8))->capture_default_str();

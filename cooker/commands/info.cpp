@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "asset_directory.h"
+#include "byte_account.h"
 #include "commands/commands.h"
 #include "rill/rill.h"
 
@@ -72,6 +73,7 @@ nlohmann::json describe(const std::string& path) {
             {"file_bytes", h.file_bytes},
             {"directory_bytes", h.directory_bytes},
             {"chunk_bytes", chunk_bytes},
+            {"bytes", to_json(account_for_bytes(directory))},
             {"bytes_per_frame", double(h.file_bytes) / h.frame_count},
             {"frames", h.frame_count},
             {"first_frame", h.first_frame},
@@ -89,18 +91,30 @@ nlohmann::json describe(const std::string& path) {
             {"cook", settings}};
 }
 
-void print_bytes(const nlohmann::json& cook) {
-    const nlohmann::json* bytes = nullptr;
-    if (cook.is_object() && cook.contains("bytes") && cook["bytes"].is_object()) bytes = &cook["bytes"];
-    if (!bytes) return;
-    double total = 0;
-    for (const auto& [kind, value] : bytes->items())
-        if (value.is_number()) total += value.get<double>();
-    std::printf("bytes by kind\n");
-    for (const auto& [kind, value] : bytes->items())
-        if (value.is_number())
-            std::printf("  %-12s %12s  %5.1f %%\n", kind.c_str(), readable_bytes(value.get<double>()).c_str(),
-                        total > 0 ? 100 * value.get<double>() / total : 0);
+/// A row per kind, a column per layer; the last row is the file.
+void print_bytes(const nlohmann::json& bytes, double file_bytes) {
+    const nlohmann::json& layers = bytes["layers"];
+    std::printf("bytes               ");
+    for (size_t l = 0; l < layers.size(); ++l) std::printf("  layer %zu", l);
+    std::printf("       all  share\n");
+    const auto row = [&](const std::string& kind, const std::vector<double>& of_layer, double all) {
+        std::printf("  %-18s", kind.c_str());
+        for (size_t l = 0; l < layers.size(); ++l)
+            if (l < of_layer.size()) std::printf("%9.0f", of_layer[l]);
+            else std::printf("%9s", "");
+        std::printf("%10.0f %5.1f %%\n", all, 100 * all / file_bytes);
+    };
+    std::vector<double> of_layer(layers.size(), 0);
+    double sum = 0;
+    for (const auto& [kind, ignored] : layers[0].items()) {
+        std::vector<double> values;
+        double all = 0;
+        for (size_t l = 0; l < layers.size(); ++l) values.push_back(layers[l][kind]), all += values[l], of_layer[l] += values[l];
+        row(kind, values, all), sum += all;
+    }
+    for (const auto& [kind, value] : bytes.items())
+        if (value.is_number()) row(kind, {}, value), sum += value.get<double>();
+    row("all", of_layer, sum);
 }
 
 void print_lives(const nlohmann::json& cook) {
@@ -138,7 +152,7 @@ void print(const nlohmann::json& info) {
                     window["frames"].get<double>(), window["blocks"].get<double>(), window["chunks"].get<double>(),
                     window["points"].get<double>(), readable_bytes(window["bytes"].get<double>()).c_str());
     print_lives(info["cook"]);
-    print_bytes(info["cook"]);
+    print_bytes(info["bytes"], number("file_bytes"));
     if (!info["cook"].is_null()) std::printf("cook\n%s\n", info["cook"].dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 

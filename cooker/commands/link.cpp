@@ -22,7 +22,7 @@ void add_link(CLI::App& app, Run& run) {
         run = [options] {
             const Linked linked = link_asset(options->parts, options->output);
             if (!options->report.empty()) write_json(options->report, linked.report);
-            return tell_target(options->output, linked.target_p99, linked.measured_p99, linked.target_met, options->quiet);
+            return tell_target(options->output, linked, options->quiet);
         };
     });
 }

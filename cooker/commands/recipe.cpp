@@ -19,7 +19,7 @@ struct Key {
     Kind kind;
 };
 constexpr Key keys[] = {
-    {"input", "INPUT", Kind::path}, {"output", "--output", Kind::path}, {"error", "--error", Kind::text},
+    {"input", "INPUT", Kind::path}, {"output", "--output", Kind::path}, {"error", "--error", Kind::text}, {"bitrate", "--bitrate", Kind::number},
     {"frames", "--frames", Kind::text}, {"fps", "--fps", Kind::number}, {"window", "--window", Kind::number},
     {"layers", "--layers", Kind::number}, {"jobs", "--jobs", Kind::number}, {"velocity", "--velocity", Kind::text},
     {"velocity-unit", "--velocity-unit", Kind::text}, {"up", "--up", Kind::text}, {"handedness", "--handedness", Kind::text},
@@ -70,6 +70,8 @@ std::map<std::string, double> targets_of(const json& given, const std::string& p
 std::map<std::string, double> apply_recipe(const std::string& path, CLI::App& command) {
     const json recipe = parse_once(path);
     if (!recipe.is_object()) throw InputError(path + ": not a JSON object");
+    if (recipe.contains("error") && recipe.contains("bitrate")) throw UsageError(path + ": 'bitrate' stands in place of 'error': one of them");
+    const bool aimed = command.count("--error") + command.count("--bitrate") > 0;  // either goes before both
     std::map<std::string, double> targets;
     for (const auto& [name, value] : recipe.items()) {
         if (name == "version") {
@@ -88,6 +90,7 @@ std::map<std::string, double> apply_recipe(const std::string& path, CLI::App& co
         }
         if (key->kind == Kind::number ? !value.is_number() : !value.is_string())
             throw UsageError(path + ": '" + name + "' must be a " + (key->kind == Kind::number ? "number" : "text"));
+        if (aimed && (name == "error" || name == "bitrate")) continue;
         std::string text = value.is_string() ? value.get<std::string>() : value.dump();
         if (key->kind == Kind::path) text = (fs::path(path).parent_path() / text).string();  // as it is when absolute
         CLI::Option* option = command.get_option_no_throw(key->option);

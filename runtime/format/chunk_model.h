@@ -17,7 +17,7 @@
 namespace rill::format {
 
 /// What Coder::category() is told: where the next bits are spent.
-enum BitCategory : int { bits_structure, bits_births, bits_motion, bits_normals, bits_drops };
+enum BitCategory : int { bits_structure, bits_births, bits_motion, bits_normals, bits_drops, bits_first, bit_categories };
 
 /// Magnitude class: 0, 1, 2, 3–4, 5–8, 9–16 …
 inline uint32_t magnitude_class(uint32_t m) {

@@ -434,7 +434,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         for (uint32_t c = 0; c < 3; ++c)
             t.position[0][c] = signed_value(drop_path, {0, 0, 0, 0}, source ? source->position[0][c] : 0);
     } else {
-        coder_.category(bits_births);
+        coder_.category(bits_first);
         if (!axis(t, near, source)) {
             reason = "a normal is out of range";
             return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Surface cells without specks: pieces of one corner or two, or of a few that fewer than three points stand by. They are
+// Surface cells without specks: pieces of a few corners that fewer than three points stand by, and no drop. They are
 // what the field means where patches of sharp rims end, not liquid: a violent splash had 15 in a frame, of 12 to 50
 // triangles. The march has visited all cells round a piece, so that its neighbours are known. Corners that tiles of
 // different size share stay as they are: those see other neighbours.
@@ -12,7 +12,7 @@
 namespace rill {
 namespace {
 
-constexpr uint32_t always_speck = 2, most_corners = 24, enough_points = 3;
+constexpr uint32_t most_corners = 24, enough_points = 3;
 constexpr int widest = 7;  // steps from the first corner: a piece lies in its tile and those beside
 
 enum class Sign { unknown, outside, inside };
@@ -128,7 +128,7 @@ void find_specks(const Mesher& m, MesherScratch& s, Tile& tile) {
         uint32_t bits = firsts(tile, row % 8, row / 8);
         for (int x = 0; bits; ++x, bits >>= 1) {
             if (!(bits & 1) || !collect(m, tile, {x, int(row % 8), int(row / 8)}, piece)) continue;
-            if (piece.count > always_speck && count_points(m, s, tile, piece) >= enough_points) continue;
+            if (count_points(m, s, tile, piece) >= enough_points) continue;
             tile.speck[row] |= uint8_t(1 << x);
             tile.has_specks = true;
         }

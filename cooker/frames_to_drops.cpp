@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+// Small closed pieces of liquid that are nearly ellipsoids, taken out of the meshes before points are scattered: one
+// track of an ellipsoid instead of a dozen of points, and rounder than so few points would make it.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "pipeline.h"
+
+namespace rill::cooker {
+namespace {
+
+constexpr double most_volume = 100;     // cubic edges
+constexpr float most_rms = 1.f;         // of the tolerance: of a piece's vertices from its ellipsoid
+constexpr float flattest = 0.12f;       // shortest over longest axis
+constexpr float reach = 2;              // edges that a drop may land off where its velocity takes it
+constexpr float most_growth = 2;        // of volume from frame to frame, either way
+
+/// Vertices by the piece they belong to: the first vertex of each names it.
+std::vector<uint32_t> label_pieces(const Mesh& mesh) {
+    std::vector<uint32_t> parent(mesh.positions.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](uint32_t v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const Triangle& t : mesh.triangles)
+        for (int k = 1; k < 3; ++k) {
+            const uint32_t a = root(t[0]), b = root(t[size_t(k)]);
+            parent[std::max(a, b)] = std::min(a, b);
+        }
+    for (uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
+    return parent;
+}
+
+/// Volume integrals of a closed piece, about `base`: 1, x, x xᵀ.
+struct Moments {
+    double volume = 0;
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    void add(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+        const double six = a.dot(b.cross(c));
+        const Eigen::Vector3d sum = a + b + c;
+        volume += six / 6, first += six / 24 * sum;
+        second += six / 120 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
+    }
+};
+
+Eigen::Vector3d eigen(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
+/// The ellipsoid of the same volume, centre and second moments, if the piece is one within `rms` metres.
+std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, float edge, float rms) {
+    const glm::vec3 base = mesh.positions[mesh.triangles[triangles.front()][0]];
+    Moments m;
+    std::vector<uint32_t> vertices;
+    for (uint32_t t : triangles) {
+        const Triangle& v = mesh.triangles[t];
+        m.add(eigen(mesh.positions[v[0]] - base), eigen(mesh.positions[v[1]] - base), eigen(mesh.positions[v[2]] - base));
+        vertices.insert(vertices.end(), v.begin(), v.end());
+    }
+    if (!(m.volume > 0) || m.volume > most_volume * std::pow(double(edge), 3)) return {};
+    const Eigen::Vector3d centre = m.first / m.volume;
+    const Eigen::Matrix3d covariance = m.second / m.volume - centre * centre.transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(5 * covariance);  // of a solid ellipsoid: S² / 5
+    if (axes.info() != Eigen::Success || !(axes.eigenvalues()[0] > flattest * flattest * axes.eigenvalues()[2])) return {};
+    const Eigen::Matrix3d shape = axes.operatorSqrt(), inverse = axes.operatorInverseSqrt();
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    double sum = 0;
+    Drop drop;
+    for (uint32_t v : vertices) {
+        const Eigen::Vector3d q = inverse * (eigen(mesh.positions[v] - base) - centre);
+        const double length = q.norm(), distance = (length - 1) * length / std::max((inverse * q).norm(), 1e-12);
+        sum += distance * distance;
+        if (!mesh.velocities.empty()) drop.velocity += mesh.velocities[v] / float(vertices.size());
+    }
+    if (!(std::sqrt(sum / double(vertices.size())) <= rms)) return {};
+    drop.centre = base + glm::vec3(centre.x(), centre.y(), centre.z());
+    drop.volume = float(m.volume);
+    drop.shape = {float(shape(0, 0)), float(shape(1, 1)), float(shape(2, 2)), float(shape(0, 1)), float(shape(0, 2)), float(shape(1, 2))};
+    return drop;
+}
+
+/// Leaves out triangles whose piece is marked, and vertices that none of the others uses.
+void remove_pieces(Mesh& mesh, const std::vector<uint32_t>& piece, const std::vector<bool>& marked) {
+    std::vector<uint32_t> place(mesh.positions.size(), ~0u);
+    Mesh kept;
+    for (Triangle t : mesh.triangles) {
+        if (marked[piece[t[0]]]) continue;
+        for (uint32_t& v : t) {
+            if (place[v] == ~0u) {
+                place[v] = uint32_t(kept.positions.size());
+                kept.positions.push_back(mesh.positions[v]);
+                if (!mesh.normals.empty()) kept.normals.push_back(mesh.normals[v]);
+                if (!mesh.velocities.empty()) kept.velocities.push_back(mesh.velocities[v]);
+            }
+            v = place[v];
+        }
+        kept.triangles.push_back(t);
+    }
+    mesh = std::move(kept);
+}
+
+struct Match {
+    float distance;
+    uint32_t track, drop;
+};
+
+}  // namespace
+
+std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
+    const std::vector<uint32_t> piece = label_pieces(mesh);
+    std::vector<uint32_t> size(mesh.positions.size(), 0);
+    for (const Triangle& t : mesh.triangles) ++size[piece[t[0]]];
+    constexpr uint32_t most_triangles = 600;  // of so small a volume: beyond, it is no drop
+    std::vector<uint32_t> names, slot(mesh.positions.size(), ~0u);
+    for (uint32_t v = 0; v < size.size(); ++v)
+        if (size[v] > 0 && size[v] <= most_triangles) slot[v] = uint32_t(names.size()), names.push_back(v);
+    std::vector<std::vector<uint32_t>> triangles(names.size());
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+        if (const uint32_t s = slot[piece[mesh.triangles[t][0]]]; s != ~0u) triangles[s].push_back(t);
+    std::vector<Drop> drops;
+    std::vector<bool> marked(mesh.positions.size(), false);
+    for (size_t s = 0; s < names.size(); ++s)
+        if (const auto drop = fit_drop(mesh, triangles[s], edge, most_rms * tolerance)) drops.push_back(*drop), marked[names[s]] = true;
+    if (!drops.empty()) remove_pieces(mesh, piece, marked);
+    return drops;
+}
+
+std::vector<TrackSamples> track_drops(const Window& window) {
+    std::vector<TrackSamples> tracks;
+    std::vector<uint32_t> alive;               // tracks at the sample before
+    std::vector<const Drop*> at;               // what they were there
+    for (int s = 0; s < window.samples(); ++s) {
+        const SurfaceFrame& frame = *window.frames[size_t(s)];
+        const float seconds = s ? float(window.seconds[size_t(s)] - window.seconds[size_t(s - 1)]) : 0;
+        std::vector<Match> matches;
+        for (uint32_t a = 0; a < alive.size(); ++a)
+            for (uint32_t d = 0; d < frame.drops.size(); ++d) {
+                const Drop &from = *at[a], &to = frame.drops[d];
+                const float growth = to.volume / from.volume;
+                const float off = glm::distance(from.centre + 0.5f * seconds * (from.velocity + to.velocity), to.centre);
+                const float still = glm::distance(from.centre, to.centre);
+                if (growth < most_growth && growth > 1 / most_growth && std::min(off, still) < reach * frame.edge)
+                    matches.push_back({std::min(off, still), a, d});
+            }
+        std::sort(matches.begin(), matches.end(), [](const Match& a, const Match& b) {
+            return a.distance != b.distance ? a.distance < b.distance : a.track != b.track ? a.track < b.track : a.drop < b.drop;
+        });
+        std::vector<uint32_t> track_of(frame.drops.size(), ~0u);
+        std::vector<bool> carried(alive.size(), false);
+        for (const Match& match : matches)
+            if (!carried[match.track] && track_of[match.drop] == ~0u) carried[match.track] = true, track_of[match.drop] = alive[match.track];
+        alive.clear(), at.clear();
+        for (uint32_t d = 0; d < frame.drops.size(); ++d) {
+            if (track_of[d] == ~0u) {
+                track_of[d] = uint32_t(tracks.size());
+                TrackSamples& track = tracks.emplace_back();
+                track.birth = uint8_t(s), track.drop = true;
+                track.flags = s > 0 ? format::track_born : 0;
+            }
+            TrackSamples& track = tracks[track_of[d]];
+            track.death = uint8_t(s);
+            track.position.push_back(frame.drops[d].centre), track.shape.push_back(frame.drops[d].shape);
+            alive.push_back(track_of[d]), at.push_back(&frame.drops[d]);
+        }
+    }
+    for (TrackSamples& track : tracks)
+        if (track.death + 1 < window.samples()) track.flags |= format::track_dies;
+    return tracks;
+}
+
+}  // namespace rill::cooker

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// Small pieces of liquid: which are taken for ellipsoids, how near those come, and how they are tracked.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "pipeline.h"
+#include "shapes.h"
+
+using namespace rill::cooker;
+
+namespace {
+
+constexpr float edge = 0.05f;
+
+void join(Mesh& to, Mesh piece) {
+    const uint32_t first = uint32_t(to.positions.size());
+    for (Triangle t : piece.triangles) to.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    to.positions.insert(to.positions.end(), piece.positions.begin(), piece.positions.end());
+    piece.velocities.resize(piece.positions.size(), glm::vec3(0));
+    to.velocities.insert(to.velocities.end(), piece.velocities.begin(), piece.velocities.end());
+}
+
+/// Half axes along a turned frame; the shape matrix that belongs to them.
+const glm::vec3 half(0.06f, 0.08f, 0.11f);
+const glm::mat3 turn = [] {
+    const glm::vec3 a = glm::normalize(glm::vec3(1, 2, -1)), b = glm::normalize(glm::cross(a, glm::vec3(0, 0, 1)));
+    return glm::mat3(a, b, glm::cross(a, b));
+}();
+const glm::mat3 shape = turn * glm::mat3(half.x, 0, 0, 0, half.y, 0, 0, 0, half.z) * glm::transpose(turn);
+
+Mesh ellipsoid(const glm::vec3& centre, const glm::vec3& velocity) {
+    Mesh mesh = sphere(20, 1);
+    for (glm::vec3& x : mesh.positions) x = centre + shape * x;
+    mesh.velocities.assign(mesh.positions.size(), velocity);
+    return mesh;
+}
+Mesh scene(const glm::vec3& drop, const glm::vec3& velocity) {
+    Mesh mesh;
+    join(mesh, sphere(40, 1));  // too large
+    join(mesh, ellipsoid(drop, velocity));
+    join(mesh, sphere(20, 0.1f, {0, 3, 0}, 0.3f));  // of a drop's size, but no ellipsoid
+    Mesh bubble = sphere(16, 0.1f, {0, 0, 0});  // air in the large ball
+    for (Triangle& t : bubble.triangles) std::swap(t[1], t[2]);
+    join(mesh, bubble);
+    return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("an ellipsoid becomes a drop, and only that") {
+    const glm::vec3 centre(2, 0.3f, -0.4f), velocity(1, 2, 3);
+    Mesh mesh = scene(centre, velocity);
+    const size_t before = mesh.triangles.size(), own = ellipsoid(centre, velocity).triangles.size();
+    const std::vector<Drop> drops = take_drops(mesh, edge, 0.1f * edge);
+    REQUIRE(drops.size() == 1);
+    const Drop& drop = drops.front();
+    CHECK(glm::distance(drop.centre, centre) < 1e-3f);
+    CHECK(glm::distance(drop.velocity, velocity) < 1e-4f);
+    const float wanted[6] = {shape[0][0], shape[1][1], shape[2][2], shape[1][0], shape[2][0], shape[2][1]};
+    for (size_t k = 0; k < 6; ++k) CHECK(drop.shape[k] == doctest::Approx(wanted[k]).epsilon(0.03).scale(0.1));
+    CHECK(mesh.triangles.size() == before - own);
+    for (const Triangle& t : mesh.triangles)
+        for (uint32_t v : t) REQUIRE(v < mesh.positions.size());
+    for (const glm::vec3& x : mesh.positions) CHECK(glm::distance(x, centre) > 0.5f);  // no vertex is left behind
+    CHECK(mesh.velocities.size() == mesh.positions.size());
+}
+
+TEST_CASE("with a wide tolerance the bumpy one is a drop as well; a mesh of drops alone leaves nothing") {
+    Mesh mesh = scene({2, 0, 0}, {});
+    CHECK(take_drops(mesh, edge, edge).size() == 2);
+    Mesh alone = ellipsoid({}, {});
+    CHECK(take_drops(alone, edge, edge).size() == 1);
+    CHECK(alone.positions.empty());
+    CHECK(alone.triangles.empty());
+    CHECK(take_drops(alone, edge, edge).empty());
+}
+
+TEST_CASE("drops are tracked through what they meet: two cross, one comes and goes") {
+    const float fps = 24;
+    Window window;
+    for (int s = 0; s < 6; ++s) {
+        const float t = float(s) / fps;
+        Mesh mesh;
+        join(mesh, ellipsoid({-0.5f + 5 * t, 0, 0}, {5, 0, 0}));
+        join(mesh, ellipsoid({0.5f - 5 * t, 0.4f, 0}, {-5, 0, 0}));
+        if (s == 2 || s == 3) join(mesh, ellipsoid({0, 3, 0}, {}));
+        std::vector<Drop> drops = take_drops(mesh, edge, edge);
+        window.frames.push_back(std::make_shared<SurfaceFrame>(mesh, edge, std::move(drops)));
+        window.seconds.push_back(t);
+    }
+    const std::vector<TrackSamples> tracks = track_drops(window);
+    REQUIRE(tracks.size() == 3);
+    for (const TrackSamples& track : tracks) {
+        CHECK(track.drop);
+        CHECK(track.position.size() == size_t(track.death - track.birth + 1));
+        CHECK(track.shape.size() == track.position.size());
+        const bool comes = track.position.front().y > 2;
+        CHECK(track.birth == (comes ? 2 : 0));
+        CHECK(track.death == (comes ? 3 : 5));
+        CHECK(track.flags == (comes ? rill::format::track_born | rill::format::track_dies : 0));
+        for (size_t k = 1; k < track.position.size(); ++k)
+            CHECK(std::fabs(std::fabs(track.position[k].x - track.position[k - 1].x) - (comes ? 0 : 5 / fps)) < 1e-3f);
+    }
+}
