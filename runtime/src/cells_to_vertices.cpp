@@ -152,7 +152,7 @@ void write3(const Stream& stream, uint32_t index, const float v[3]) {
 }
 
 /// Moves a batch of n vertices onto the field and writes them from `first_vertex` on.
-void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, uint32_t first_vertex) {
+void finish_batch(const Mesher& m, MesherScratch& s, Tile& tile, uint32_t n, uint32_t first_vertex) {
     const bool moving = m.input.velocity && m.input.target && m.input.target->velocity.data;
     float* velocity = moving ? s.velocity : nullptr;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
@@ -172,6 +172,7 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
             const float scale = 1 / std::sqrt(length2);
             for (float& c : normal) c *= scale;
             std::memcpy(m.position + 3 * size_t(vertex), p, sizeof(p));
+            cover(tile, p);
             if (!m.input.target) continue;
             write3(m.input.target->position, vertex, p);
             write3(m.input.target->normal, vertex, normal);
@@ -185,6 +186,7 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
 
 void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
     uint32_t n = 0, done = 0;
+    for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
     list_candidates(m, s, tile);
     for_surface_cells(tile, [&](uint32_t cell) {
         const CellPattern pattern = pattern_at(m, tile, cell);

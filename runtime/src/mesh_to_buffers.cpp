@@ -63,11 +63,8 @@ QuadMasks quads_of_row(const Neighbourhood& n, int y, int z) {
              uint32_t(corner[0] ^ corner[9]) & here & back & left & back_left}};
 }
 
-/// The vertex of the cell at tile-relative x y z (each from −1) on the patch that `edge` belongs to.
-uint32_t vertex_at(const Neighbourhood& n, const int at[3], uint32_t edge) {
-    const uint32_t k = (at[0] < 0 ? 1u : 0u) | (at[1] < 0 ? 2u : 0u) | (at[2] < 0 ? 4u : 0u);
-    const Tile& tile = *n.tile[k];
-    const uint32_t cell = uint32_t((at[0] & 7) + 8 * (at[1] & 7) + 64 * (at[2] & 7));
+/// The vertex of a cell on the patch that `edge` belongs to.
+uint32_t vertex_of(const Tile& tile, uint32_t cell, uint32_t edge) {
     return tile.first_vertex + tile.placed.vertex[cell] + patch_of(tile.placed.pattern[cell], edge);
 }
 
@@ -77,17 +74,22 @@ struct TileWriter {
     Neighbourhood near;
     uint32_t* out;  ///< null: not wanted
 
-    void quad(uint32_t axis, const int at[3], bool liquid_below) {
-        const uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+    template <uint32_t axis>
+    void quad(const int (&at)[3], bool liquid_below) {
+        constexpr uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
         uint32_t index[4];
-        // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below.
-        constexpr int step_u[4] = {-1, 0, 0, -1}, step_v[4] = {-1, -1, 0, 0};
+        // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below. Per cell
+        // around the edge: one down along u (1) and v (2)?
+        constexpr uint32_t down[4] = {3, 2, 0, 1};
+        const uint32_t inner = (at[u] > 0 ? 1u : 0u) | (at[v] > 0 ? 2u : 0u), turn = liquid_below ? 0 : 3;
+        const uint32_t home = uint32_t(at[0] + 8 * at[1] + 64 * at[2]);
         for (uint32_t k = 0; k < 4; ++k) {
-            const uint32_t from = liquid_below ? k : 3 - k;
-            int cell[3] = {at[0], at[1], at[2]};
-            cell[u] += step_u[from], cell[v] += step_v[from];
-            index[k] = vertex_at(near, cell, 4 * axis + (step_u[from] ? 1 : 0) + (step_v[from] ? 2 : 0));
-            cover(tile, m.position + 3 * size_t(index[k]));
+            const uint32_t step = down[k ^ turn], beyond = step & ~inner, edge = 4 * axis + step;
+            // A step out of the tile comes in on the far side of the one beyond.
+            const uint32_t cell = home - ((step & 1) << 3 * u) - (step >> 1 << 3 * v) + ((beyond & 1) << (3 * u + 3)) +
+                                  (beyond >> 1 << (3 * v + 3));
+            index[k] = vertex_of(*near.tile[(beyond & 1) << u | beyond >> 1 << v], cell, edge);
+            if (beyond) cover(tile, m.position + 3 * size_t(index[k]));
         }
         if (!out) return;
         const uint32_t s = shorter_first(m, index) ? 0 : 1;
@@ -101,7 +103,6 @@ struct TileWriter {
 void write_tile(const Mesher& m, Tile& tile) {
     const Target* target = m.input.target;
     uint32_t* out = target && target->indices ? target->indices + tile.first_index : nullptr;
-    for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
     if (tile.beside) {
         join_mixed(m, tile, out, true);
         return;
@@ -111,11 +112,9 @@ void write_tile(const Mesher& m, Tile& tile) {
         for (int y = 0; y < tile_cells; ++y) {
             const QuadMasks quads = quads_of_row(writer.near, y, z);
             const uint32_t liquid = tile.inside[y + 9 * z];
-            for (uint32_t axis = 0; axis < 3; ++axis)
-                for_bits(quads.axis[axis], [&](uint32_t x) {
-                    const int at[3] = {int(x), y, z};
-                    writer.quad(axis, at, liquid >> x & 1);
-                });
+            for_bits(quads.axis[0], [&](uint32_t x) { writer.quad<0>({int(x), y, z}, liquid >> x & 1); });
+            for_bits(quads.axis[1], [&](uint32_t x) { writer.quad<1>({int(x), y, z}, liquid >> x & 1); });
+            for_bits(quads.axis[2], [&](uint32_t x) { writer.quad<2>({int(x), y, z}, liquid >> x & 1); });
         }
 }
 

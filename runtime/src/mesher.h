@@ -40,7 +40,7 @@ struct Tile {
     uint64_t turned[6];              ///< faces on borders with finer tiles, as `cross`: see turn_border_faces()
     uint8_t speck[rows_per_tile];    ///< corners that begin a piece which is noise; the tile's own, as cells
     bool has_specks;
-    float lower[3], upper[3];        ///< of all vertices its triangles use
+    float lower[3], upper[3];        ///< of its vertices, and of all that its triangles use
     Beside at_place(uint32_t place) const { return Beside(beside >> (2 * place) & 3); }
     union {
         float value[corners_per_tile];  ///< until the vertices are placed
