@@ -96,7 +96,7 @@ TEST_CASE("frames that are not as far apart in time as stated") {
         Mesh mesh = ball(0, true, 1);
         for (glm::vec3& x : mesh.positions) x.z -= 0.12f * (frame == 6 ? 5.5f : float(frame));
         mesh.velocities.assign(mesh.positions.size(), {0, 0, -0.12f * 24});
-        put_file(folder / ("f" + std::to_string(frame) + ".ply"), plain_ply(mesh));
+        put_file(folder / (std::to_string(frame) + ".ply"), plain_ply(mesh));
     }
     std::string warning;
     const VelocityFit fit = fit_of(*open_sequence(folder.path.string(), {}), warning);
