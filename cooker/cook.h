@@ -25,6 +25,7 @@ struct CookSettings {
     std::string survey;            ///< file the survey is kept in, for other segments of the same cook
     bool force = false;            ///< cook even what is there already
 };
+/// Told by one thread at a time, though not always the same.
 struct CookProgress {
     uint32_t frames_done, frames_total;
     std::string stage;

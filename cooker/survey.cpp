@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <mutex>
 
 #include "input_hash.h"
 #include "output_file.h"
@@ -109,9 +110,11 @@ json kept_survey(const std::string& file, const std::string& states, const ReadO
 Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<void(const std::string&)>& warn,
                    const std::function<void(uint32_t)>& progress) {
     std::vector<FrameFacts> facts(reader.info().numbers.size());
-    std::atomic<uint32_t> count{0};
+    uint32_t count = 0;
+    std::mutex counting;
     parallel_for(facts.size(), jobs, [&](size_t i) {
         facts[i] = facts_of(reader.read_surface(i));
+        const std::lock_guard lock(counting);
         progress(++count);
     });
     Survey result;

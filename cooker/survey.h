@@ -22,7 +22,7 @@ struct Survey {
 };
 /// Looks at every frame; tells `warn` what of the source will disappoint, with advice.
 /// `file`: kept there, and taken from there when the input has not been touched since; empty: not kept.
-/// `input`: hash of the contents, if known already.
+/// `input`: hash of the contents, if known already. `progress` is called by one thread at a time.
 Survey survey_input(const SequenceReader& reader, const ReadOptions& options, const std::string& file, const std::string& input, int jobs,
                     const std::function<void(uint32_t done)>& progress);
 /// Hash of the input's contents, from `file` if that still tells it.

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+#include "span_to_part.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "error_target.h"
+#include "frames_to_tracks.h"
+#include "parallel.h"
+#include "rate_search.h"
+#include "window_to_chunks.h"
+
+namespace rill::cooker {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int most_attempts = 3;
+constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
+constexpr double first_tolerance = 1.15;     // of the error aimed at
+constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
+
+WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
+    WindowGoal goal;
+    const float t = float(tolerance);
+    goal.tolerance = t;
+    goal.quantiser = {0.3f * t, 3.f, 0.045f, 0.2f * t, 0.045f};
+    goal.origin = facts.lower;
+    goal.jobs = jobs;
+    return goal;
+}
+
+/// Some frames of a sequence.
+class ChosenFrames : public SequenceReader {
+public:
+    ChosenFrames(const SequenceReader& source, std::vector<size_t> chosen) : source_(source), info_(source.info()), chosen_(std::move(chosen)) {
+        info_.numbers.clear(), info_.seconds.clear();
+        for (size_t i : chosen_) info_.numbers.push_back(source.info().numbers[i]), info_.seconds.push_back(source.info().seconds[i]);
+    }
+    const SequenceInfo& info() const override { return info_; }
+    std::string name(size_t index) const override { return source_.name(chosen_.at(index)); }
+    std::vector<fs::path> files(size_t index) const override { return source_.files(chosen_.at(index)); }
+    Mesh read(size_t index) const override { return source_.read(chosen_.at(index)); }
+    Mesh read_surface(size_t index) const override { return source_.read_surface(chosen_.at(index)); }
+
+private:
+    const SequenceReader& source_;
+    SequenceInfo info_;
+    std::vector<size_t> chosen_;
+};
+
+/// Gone when the work fails or ends.
+struct TemporaryFile {
+    std::string path;
+    ~TemporaryFile() {
+        std::error_code ignored;
+        fs::remove(path, ignored);
+    }
+};
+
+void move_file(const std::string& from, const std::string& to) {
+    std::error_code failed;
+    fs::rename(from, to, failed);
+    if (failed) throw InputError(to + ": cannot be written: " + failed.message());
+}
+
+}  // namespace
+
+SpanCook::SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan,
+                   const CookFacts& facts, const Aim& aim)
+    : reader_(reader), settings_(settings), survey_(survey), plan_(plan), facts_(facts), aim_(aim) {
+    tables_memory_.resize(format::basis_tables_bytes(uint32_t(settings.window) + 1) / sizeof(double) + 2);
+    format::build_basis_tables(tables_, tables_memory_.data(), uint32_t(settings.window) + 1);
+}
+
+void SpanCook::run(uint32_t span, const std::string& output, const std::function<void(uint32_t)>& done) const {
+    const TemporaryFile candidate{output + ".cooking"}, best{output + ".best"};
+    const SpanResult kept = aim_.bytes > 0 ? within_rate(span, candidate.path, best.path, done) : at_error(span, candidate.path, best.path, done);
+    AssetWriter writer(output);
+    writer.append(read_directory(best.path), 0);
+    write(writer, kept);
+}
+
+SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
+    const ChosenFrames judged(reader_, judged_frames_of(span));
+    SpanResult kept;
+    double tolerance = first_tolerance * aim_.p99, best_miss = HUGE_VAL;
+    for (int attempt = 1;; ++attempt) {
+        SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
+        result.measured = verify(candidate, judged, settings_.jobs).totals;
+        const double ratio = result.measured.p99() / aim_.p99, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
+        if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate, best);
+        kept.attempts = attempt;
+        if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) return kept;
+        tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
+    }
+}
+SpanResult SpanCook::within_rate(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
+    const std::vector<double>& seconds = reader_.info().seconds;
+    const double all = seconds.back() - seconds.front(), own = seconds[plan_.last(span)] - seconds[plan_.first(span)];
+    const double allowed = aim_.bytes * (all > 0 ? own / all : 1);
+    RateSearch search(usual_tolerance * survey_.edge, finest_tolerance * survey_.edge, coarsest_tolerance * survey_.diagonal());
+    SpanResult kept;
+    int attempts = 0;
+    while (const std::optional<double> tolerance = search.next()) {
+        SpanResult result = cook(span, candidate, *tolerance, [&](uint32_t frames) { if (attempts == 0) done(frames); });
+        if (search.add(*tolerance, bytes_in_asset(facts_, read_directory(candidate), result) / allowed))
+            kept = std::move(result), move_file(candidate, best);
+        kept.attempts = ++attempts;
+    }
+    kept.measured = verify(best, ChosenFrames(reader_, judged_frames_of(span)), settings_.jobs).totals;
+    return kept;
+}
+
+std::vector<size_t> SpanCook::judged_frames_of(uint32_t span) const {
+    const uint32_t nominal = std::min(plan_.length(), plan_.frames), stride = (nominal + judged_frames - 1) / judged_frames;
+    const uint32_t end = plan_.last(span) + (span + 1 == plan_.spans() ? 1 : 0);
+    std::vector<size_t> chosen;
+    for (uint32_t i = plan_.first(span); i < end; i += stride) chosen.push_back(i);
+    return chosen;
+}
+
+SpanResult SpanCook::cook(uint32_t span, const std::string& output, double tolerance, const std::function<void(uint32_t)>& done) const {
+    const WindowGoal goal = goal_for(tolerance, survey_, settings_.jobs);
+    AssetWriter writer(output);
+    const SequenceInfo& info = reader_.info();
+    const uint32_t begin = plan_.first(span), end = plan_.last(span);
+    SpanResult result;
+    result.span = span, result.tolerance = tolerance;
+    result.numbers.assign(info.numbers.begin() + begin, info.numbers.begin() + end + 1);
+    result.seconds.assign(info.seconds.begin() + begin, info.seconds.begin() + end + 1);
+    std::vector<Path> survivors;
+    std::shared_ptr<const SurfaceFrame> border;
+    for (uint32_t first = begin;; first += plan_.window) {
+        Window window = load(first, std::min(end, first + plan_.window), border, float(tolerance));
+        window.opens_span = first == begin;
+        const uint32_t last = first + uint32_t(window.samples()) - 1;
+        grow_tracks(window, survivors, goal);
+        const CodedWindow coded = code_tracks(window, goal, tables_);
+        write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), last == end, result);
+        survivors = survivors_of(window);
+        border = window.frames.back();
+        done(last - begin);
+        if (last == end) break;
+    }
+    write(writer, result);
+    return result;
+}
+
+void SpanCook::write(AssetWriter& writer, const SpanResult& result) const {
+    AssetFacts facts = asset_facts(facts_, result.numbers, result.seconds);
+    facts.settings_json = part_settings(facts_, {result}, result.numbers);
+    writer.finish(facts);
+}
+
+Window SpanCook::load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border, float tolerance) const {
+    Window window;
+    window.first = int(first);
+    window.frames.resize(last - first + 1);
+    for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
+    parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
+        if (s == 0 && border) {
+            window.frames[s] = border;
+            return;
+        }
+        Mesh mesh = reader_.read(first + s);
+        std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
+        window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
+    });
+    return window;
+}
+
+}  // namespace rill::cooker

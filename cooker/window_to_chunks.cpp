@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "window_to_chunks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "parallel.h"
+
+namespace rill::cooker {
+namespace {
+
+constexpr uint32_t most_tracks_per_block = 1500;
+
+void add(ChunkBits& sum, const ChunkBits& more) {
+    sum.structure += more.structure, sum.births += more.births, sum.motion += more.motion;
+    sum.normals += more.normals, sum.drops += more.drops;
+}
+
+/// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
+void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, float reach) {
+    chunk.lower = glm::vec3(1e30f), chunk.upper = glm::vec3(-1e30f);
+    for (const TrackSamples* track : tracks)
+        for (size_t k = 0; k < track->position.size(); ++k) {
+            const glm::vec3& p = track->position[k];
+            float wide = reach;
+            if (track->drop) {
+                const auto& s = track->shape[k];
+                wide = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+            }
+            chunk.lower = glm::min(chunk.lower, p - wide), chunk.upper = glm::max(chunk.upper, p + wide);
+        }
+}
+
+struct LayerError {
+    float mean = 0, p99 = 0, spacing = 0;
+};
+/// Error of every prefix of layers, on a few frames of the window.
+std::vector<LayerError> layer_errors(const Window& window, const CodedWindow& coded, const std::vector<uint32_t>& layer,
+                                     uint32_t layers, int jobs) {
+    constexpr int stride = 8;
+    std::vector<LayerError> errors(layers);
+    const size_t looks = (window.frames.size() + stride - 1) / stride;
+    std::vector<std::vector<LayerError>> at(looks, std::vector<LayerError>(layers));
+    parallel_for(looks * layers, jobs, [&](size_t task) {
+        const int s = int(task / layers) * stride;
+        const uint32_t l = uint32_t(task % layers);
+        const SurfaceFrame& frame = *window.frames[size_t(s)];
+        const auto points = decoded_points(coded.decoded, s, &layer, l);
+        const Residual residual = measure_residual(frame, points);
+        double area = 0, sum = 0;
+        for (size_t v = 0; v < residual.distance.size(); ++v)
+            area += frame.area[v], sum += frame.area[v] * std::min(std::fabs(residual.distance[v]), 10 * frame.edge);
+        LayerError& error = at[task / layers][l];
+        error.mean = area > 0 ? float(sum / area) : 0;
+        error.p99 = float(std::min(residual_percentile(frame, residual, 0.99), 10.0 * frame.edge));
+        error.spacing = points.empty() ? 0 : float(std::sqrt(area / double(points.size())));
+    });
+    for (const auto& look : at)
+        for (uint32_t l = 0; l < layers; ++l) {
+            errors[l].mean += look[l].mean / float(looks), errors[l].p99 += look[l].p99 / float(looks);
+            errors[l].spacing = std::max(errors[l].spacing, look[l].spacing);
+        }
+    return errors;
+}
+
+/// Tracks that end here, by how long they lived and why.
+void count_lives(SpanResult& account, const Window& window, bool ends_span) {
+    account.deaths.resize(std::size(death_names));
+    for (const Path& path : window.paths) {
+        if (path.cause == Death::none && !ends_span) continue;
+        const size_t life = size_t(path.age + path.death - path.birth + 1);
+        if (account.lives.size() <= life) account.lives.resize(life + 1);
+        ++account.lives[life], ++account.deaths[size_t(path.cause)];
+    }
+}
+
+}  // namespace
+
+void write_window(AssetWriter& writer, uint32_t first_sample, const Window& window, const CodedWindow& coded, const WindowGoal& goal,
+                  uint32_t layers, bool ends_span, SpanResult& account) {
+    std::vector<float> cost;
+    for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
+    const std::vector<uint32_t> layer = assign_layers(coded.decoded, cost, window.samples(), layers, goal.jobs);
+    uint32_t block_count = 0;
+    const std::vector<uint32_t> block = assign_blocks(coded.decoded, most_tracks_per_block, block_count);
+    const std::vector<LayerError> errors = layer_errors(window, coded, layer, layers, goal.jobs);
+    std::vector<ChunkToWrite> chunks(size_t(layers) * block_count);
+    parallel_for(chunks.size(), goal.jobs, [&](size_t c) {
+        ChunkToWrite& chunk = chunks[c];
+        chunk.layer = uint32_t(c) / block_count, chunk.block = uint32_t(c) % block_count;
+        std::vector<QuantisedTrack> tracks;
+        std::vector<const TrackSamples*> decoded;
+        for (size_t i = 0; i < layer.size(); ++i)
+            if (layer[i] == chunk.layer && block[i] == chunk.block)
+                tracks.push_back(coded.tracks[i]), decoded.push_back(&coded.decoded[i]);
+        if (tracks.empty()) return;
+        const LayerError& error = errors[chunk.layer];
+        chunk.spacing = error.spacing, chunk.error_mean = error.mean, chunk.error_p99 = error.p99;
+        bound(chunk, decoded, 1.5f * error.spacing);
+        chunk.encoded = encode_chunk(tracks, goal.quantiser, goal.origin, uint32_t(window.samples()), {});
+    });
+    std::erase_if(chunks, [](const ChunkToWrite& chunk) { return chunk.encoded.bytes.empty(); });
+    account.layer_bytes.resize(layers);
+    for (const ChunkToWrite& chunk : chunks) {
+        add(account.bits, chunk.encoded.bits);
+        account.layer_bytes[chunk.layer] += double(chunk.encoded.bytes.size());
+    }
+    account.tracks += window.paths.size();
+    for (const Path& path : window.paths) account.point_frames += uint64_t(path.death - path.birth + 1);
+    count_lives(account, window, ends_span);
+    writer.add_window(first_sample, uint32_t(window.samples()), block_count, std::move(chunks));
+}
+}  // namespace rill::cooker
