@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "readers/reader.h"
+#include "scratch_folder.h"
 #include "surface_frame.h"
 #include "writers/frame_writer.h"
 
@@ -23,37 +24,10 @@ Mesh by_meshoptimizer(const Mesh& mesh, double keep) {
     const size_t target = size_t(double(mesh.triangles.size()) * keep) * 3;
     indices.resize(meshopt_simplify(indices.data(), mesh.triangles[0].data(), mesh.triangles.size() * 3, &mesh.positions[0].x,
                                     mesh.positions.size(), sizeof(glm::vec3), target, 1.0f, 0, nullptr));
-    Mesh result;
-    std::vector<uint32_t> place(mesh.positions.size(), UINT32_MAX);
-    for (size_t i = 0; i < indices.size(); i += 3) {
-        Triangle t;
-        for (int k = 0; k < 3; ++k) {
-            const uint32_t from = indices[i + size_t(k)];
-            if (place[from] == UINT32_MAX) {
-                place[from] = uint32_t(result.positions.size());
-                result.positions.push_back(mesh.positions[from]);
-                if (!mesh.velocities.empty()) result.velocities.push_back(mesh.velocities[from]);
-            }
-            t[k] = place[from];
-        }
-        result.triangles.push_back(t);
-    }
-    return result;
+    std::vector<Triangle> kept;
+    for (size_t i = 0; i < indices.size(); i += 3) kept.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    return part_of(mesh, kept);
 }
-
-/// A folder of its own below the system's; gone with everything in it when the work is done.
-struct Scratch {
-    fs::path path;
-    Scratch() {
-        std::string name = (fs::temp_directory_path() / "rill-XXXXXX").string();
-        if (!mkdtemp(name.data())) throw InputError(name + ": cannot be made");
-        path = name;
-    }
-    ~Scratch() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-};
 
 void run_program(const std::vector<std::string>& words) {
     std::vector<char*> arguments;
@@ -77,7 +51,7 @@ std::vector<Mesh> decimate_by_meshoptimizer(const Mesh& mesh, const std::vector<
 
 std::vector<Mesh> decimate_by_program(const std::string& program, const Mesh& mesh, const std::vector<double>& keeps) {
     if (mesh.triangles.empty()) return std::vector<Mesh>(keeps.size(), mesh);
-    const Scratch scratch;
+    const ScratchFolder scratch;
     std::vector<std::string> words = {program, (scratch.path / "in.ply").string()};
     std::vector<std::string> outputs;
     Mesh bare;

@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "pipeline.h"
 
@@ -16,23 +15,6 @@ constexpr float most_rms = 1.f;         // of the tolerance: of a piece's vertic
 constexpr float flattest = 0.12f;       // shortest over longest axis
 constexpr float reach = 2;              // edges that a drop may land off where its velocity takes it
 constexpr float most_growth = 2;        // of volume from frame to frame, either way
-
-/// Vertices by the piece they belong to: the first vertex of each names it.
-std::vector<uint32_t> label_pieces(const Mesh& mesh) {
-    std::vector<uint32_t> parent(mesh.positions.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](uint32_t v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    };
-    for (const Triangle& t : mesh.triangles)
-        for (int k = 1; k < 3; ++k) {
-            const uint32_t a = root(t[0]), b = root(t[size_t(k)]);
-            parent[std::max(a, b)] = std::min(a, b);
-        }
-    for (uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
-    return parent;
-}
 
 /// Volume integrals of a closed piece, about `base`: 1, x, x xᵀ.
 struct Moments {
@@ -82,26 +64,6 @@ std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& tria
     return drop;
 }
 
-/// Leaves out triangles whose piece is marked, and vertices that none of the others uses.
-void remove_pieces(Mesh& mesh, const std::vector<uint32_t>& piece, const std::vector<bool>& marked) {
-    std::vector<uint32_t> place(mesh.positions.size(), ~0u);
-    Mesh kept;
-    for (Triangle t : mesh.triangles) {
-        if (marked[piece[t[0]]]) continue;
-        for (uint32_t& v : t) {
-            if (place[v] == ~0u) {
-                place[v] = uint32_t(kept.positions.size());
-                kept.positions.push_back(mesh.positions[v]);
-                if (!mesh.normals.empty()) kept.normals.push_back(mesh.normals[v]);
-                if (!mesh.velocities.empty()) kept.velocities.push_back(mesh.velocities[v]);
-            }
-            v = place[v];
-        }
-        kept.triangles.push_back(t);
-    }
-    mesh = std::move(kept);
-}
-
 struct Match {
     float distance;
     uint32_t track, drop;
@@ -110,7 +72,7 @@ struct Match {
 }  // namespace
 
 std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
-    const std::vector<uint32_t> piece = label_pieces(mesh);
+    const std::vector<uint32_t> piece = label_components(mesh);
     std::vector<uint32_t> size(mesh.positions.size(), 0);
     for (const Triangle& t : mesh.triangles) ++size[piece[t[0]]];
     constexpr uint32_t most_triangles = 600;  // of so small a volume: beyond, it is no drop
@@ -124,7 +86,11 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
     std::vector<bool> marked(mesh.positions.size(), false);
     for (size_t s = 0; s < names.size(); ++s)
         if (const auto drop = fit_drop(mesh, triangles[s], edge, most_rms * tolerance)) drops.push_back(*drop), marked[names[s]] = true;
-    if (!drops.empty()) remove_pieces(mesh, piece, marked);
+    if (drops.empty()) return drops;
+    std::vector<Triangle> others;
+    for (const Triangle& t : mesh.triangles)
+        if (!marked[piece[t[0]]]) others.push_back(t);
+    mesh = part_of(mesh, others);
     return drops;
 }
 

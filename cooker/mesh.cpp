@@ -2,6 +2,7 @@
 #include "mesh.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace rill::cooker {
 
@@ -46,6 +47,41 @@ double signed_volume(const Mesh& mesh) {
         six_volumes += glm::dot(a, glm::cross(b, c));
     }
     return six_volumes / 6;
+}
+
+std::vector<uint32_t> label_components(const Mesh& mesh) {
+    std::vector<uint32_t> parent(mesh.positions.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](uint32_t v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const Triangle& t : mesh.triangles)
+        for (int k = 1; k < 3; ++k) {
+            const uint32_t a = root(t[0]), b = root(t[size_t(k)]);
+            parent[std::max(a, b)] = std::min(a, b);
+        }
+    for (uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
+    return parent;
+}
+
+Mesh part_of(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+    std::vector<uint32_t> place(mesh.positions.size(), ~0u);
+    Mesh part;
+    part.triangles.reserve(triangles.size());
+    for (Triangle t : triangles) {
+        for (uint32_t& v : t) {
+            if (place[v] == ~0u) {
+                place[v] = uint32_t(part.positions.size());
+                part.positions.push_back(mesh.positions[v]);
+                if (!mesh.normals.empty()) part.normals.push_back(mesh.normals[v]);
+                if (!mesh.velocities.empty()) part.velocities.push_back(mesh.velocities[v]);
+            }
+            v = place[v];
+        }
+        part.triangles.push_back(t);
+    }
+    return part;
 }
 
 }  // namespace rill::cooker

@@ -34,5 +34,9 @@ std::vector<glm::vec3> vertex_normals(const Mesh& mesh);
 float median_edge(const Mesh& mesh);
 /// Signed volume, m³, positive for outward winding.
 double signed_volume(const Mesh& mesh);
+/// Per vertex: the connected component it belongs to, named by its first vertex.
+std::vector<uint32_t> label_components(const Mesh& mesh);
+/// `triangles` of the mesh, with the vertices they use and what those carry.
+Mesh part_of(const Mesh& mesh, const std::vector<Triangle>& triangles);
 
 }  // namespace rill::cooker

@@ -80,23 +80,6 @@ Sums measure(const Mesh& from, const std::vector<glm::vec3>& from_normals, const
     return sums;
 }
 
-/// Disjoint sets over vertices, joined by triangles.
-struct Components {
-    std::vector<uint32_t> parent;
-    explicit Components(const Mesh& mesh) : parent(mesh.positions.size()) {
-        for (uint32_t v = 0; v < parent.size(); ++v) parent[v] = v;
-        for (const Triangle& t : mesh.triangles) join(t[0], t[1]), join(t[0], t[2]);
-    }
-    uint32_t root(uint32_t v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    }
-    void join(uint32_t a, uint32_t b) {
-        a = root(a), b = root(b);
-        parent[std::max(a, b)] = std::min(a, b);
-    }
-};
-
 constexpr int mantissa_bits = 4;                         // 16 bins to the octave
 constexpr int shift = 23 - mantissa_bits;                // a float's bits, cut off there, count up with its value
 constexpr size_t bins = (0x7f800000u >> shift) + 1;      // up to and with infinity
@@ -153,11 +136,11 @@ Topology topology(const Mesh& mesh) {
 }
 
 std::vector<double> component_volumes(const Mesh& mesh) {
-    Components components(mesh);
+    const std::vector<uint32_t> component = label_components(mesh);
     std::vector<double> six_volumes(mesh.positions.size(), 0.0);
     std::vector<bool> used(mesh.positions.size(), false);
     for (const Triangle& t : mesh.triangles) {
-        const uint32_t root = components.root(t[0]);
+        const uint32_t root = component[t[0]];
         const glm::dvec3 origin = mesh.positions[root];
         const glm::dvec3 a = glm::dvec3(mesh.positions[t[0]]) - origin;
         const glm::dvec3 b = glm::dvec3(mesh.positions[t[1]]) - origin;

@@ -51,7 +51,7 @@ void play(const Bytes& bytes) {
     rill::Limits limits;
     if (status == rill::Status::ok) {
         limits = rill::suggest_limits(asset);
-        limits.vertices = std::min(limits.vertices, most_vertices), limits.indices = std::min(limits.indices, 1most_vertices);
+        limits.vertices = std::min(limits.vertices, most_vertices), limits.indices = std::min(limits.indices, most_indices);
         status = rill::create(asset, limits, &player);
     }
     if (status == rill::Status::ok) {

@@ -7,7 +7,7 @@
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     rill::cooker::Mesh ball = bumpy_sphere(8, 1), moving = ball;
     moving.velocities.assign(moving.positions.size(), {1, 2, 3});
-    fuzz::write_seeds(*argc, *argv, {rill::cooker::draco_encode(ball, 10), rill::cooker::draco_encode(moving, 14)});
+    fuzz::write_seeds(*argc, *argv, {rill::cooker::draco_encode(ball, 10, 10), rill::cooker::draco_encode(moving, 14, 12)});
     return 0;
 }
 

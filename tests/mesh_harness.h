@@ -32,6 +32,18 @@ inline Vec cross(const Vec& a, const Vec& b) {
 }
 inline constexpr double pi = 3.14159265358979323846;
 
+/// Every point in the box, for fields without an index.
+inline uint32_t gather_points(const surface::Field& f, const surface::Box& box, uint32_t* out, uint32_t capacity) noexcept {
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < f.point_count; ++i) {
+        const float p[3] = {f.x[i], f.y[i], f.z[i]};
+        bool in = true;
+        for (int a = 0; a < 3; ++a) in = in && p[a] >= box.lower[a] && p[a] <= box.upper[a];
+        if (in && n++ < capacity) out[n - 1] = i;
+    }
+    return n;
+}
+
 struct Free {
     void operator()(void* block) const { std::free(block); }
 };

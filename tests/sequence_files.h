@@ -8,17 +8,9 @@
 #include <fstream>
 #include <string>
 
-#include "mesh.h"
+#include "scratch_folder.h"
 
-/// A fresh directory, gone with the object.
-struct TestFolder {
-    std::filesystem::path path;
-    TestFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / "rill_test_XXXXXX").string();
-        path = mkdtemp(name.data());
-    }
-    ~TestFolder() { std::filesystem::remove_all(path); }
-    TestFolder(const TestFolder&) = delete;
+struct TestFolder : rill::cooker::ScratchFolder {
     std::string operator/(const std::string& name) const { return (path / name).string(); }
 };
 

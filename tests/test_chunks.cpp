@@ -140,7 +140,8 @@ std::vector<std::vector<float>> expected_numbers(const std::vector<QuantisedTrac
 TEST_CASE("a chunk decodes to exactly the quantised tracks") {
     const std::pair<uint32_t, uint32_t> sizes[] = {{0, 0},   {1, 0},   {0, 1},     {2, 1},
                                                    {40, 30}, {500, 0}, {5000, 200}};
-    for (const auto& [points, drops] : sizes) {
+    for (const auto& size : sizes) {
+        const uint32_t points = size.first, drops = size.second;
         INFO(points, " points, ", drops, " drops");
         const auto tracks = make_tracks(points, drops);
         const EncodedChunk chunk = encode(tracks);

@@ -37,16 +37,6 @@ double noise(const Vec& p) {
     return length(p) < 0.8 && (h >> 60) < 7 ? -value : value;
 }
 
-uint32_t gather_none(const surface::Field& f, const surface::Box& box, uint32_t* out, uint32_t capacity) noexcept {
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < f.point_count; ++i) {
-        const float p[3] = {f.x[i], f.y[i], f.z[i]};
-        bool in = true;
-        for (int a = 0; a < 3; ++a) in = in && p[a] >= box.lower[a] && p[a] <= box.upper[a];
-        if (in && n++ < capacity) out[n - 1] = i;
-    }
-    return n;
-}
 void analytic(const surface::Field&, const uint32_t*, uint32_t, const float* x, const float* y, const float* z,
               uint32_t n, float* value) noexcept {
     for (uint32_t i = 0; i < n; ++i) value[i] = float(surface_of({x[i], y[i], z[i]}));
@@ -65,7 +55,7 @@ void analytic_gradient(const surface::Field& f, const uint32_t* c, uint32_t coun
     }
     for (uint32_t i = 0; velocity && i < 3 * n; ++i) velocity[i] = 0;
 }
-const FieldAccess by_formula{gather_none, analytic, analytic_gradient};
+const FieldAccess by_formula{gather_points, analytic, analytic_gradient};
 
 /// Seeds on the surface, found by rays from within.
 struct Seeds {

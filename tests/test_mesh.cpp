@@ -34,18 +34,6 @@ struct HandField {
         return field;
     }
 };
-uint32_t gather_points(const surface::Field& f, const surface::Box& box, uint32_t* out,
-                       uint32_t capacity) noexcept {
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < f.point_count; ++i) {
-        const float p[3] = {f.x[i], f.y[i], f.z[i]};
-        bool in = true;
-        for (int a = 0; a < 3; ++a) in = in && p[a] >= box.lower[a] && p[a] <= box.upper[a];
-        if (in && n++ < capacity) out[n - 1] = i;
-    }
-    return n;
-}
-
 uint64_t noise_seed;  // of the grid being meshed; these tests run on one thread
 double noise_share;
 uint32_t scramble(uint64_t h) {

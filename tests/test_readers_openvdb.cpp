@@ -109,7 +109,7 @@ TEST_CASE("damaged files are refused by name") {
     put_file(folder / "f1.vdb", "");
     CHECK_FAULT(fault(folder / "f1.vdb"), "f1.vdb");
     put_file(folder / "f1.vdb", std::string(2000, 'x'));
-    CHECK_FAULT(fault(folder / "f1.vdb"), "not a usable OpenVDB file");
+    CHECK_FAULT(fault(folder / "f1.vdb"), "not usable");
     for (size_t length : {10u, 100u, 1000u}) {
         CAPTURE(length);
         put_file(folder / "f1.vdb", good.substr(0, length));

@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "asset_directory.h"
-#include "commands/bench_player.h"
+#include "commands/bench_detail.h"
 #include "commands/commands.h"
 #include "draco_mesh.h"
 
@@ -148,6 +148,7 @@ int bench_command(const BenchOptions& options) {
     std::vector<size_t> ahead = forward(frames.size()), back(ahead.rbegin(), ahead.rend());
     std::vector<Pass> passes, details;
     nlohmann::json memory;
+    std::vector<ScreenError> far;
     DracoRate draco;
     double file_bytes = double(directory.header.file_bytes), bytes_read = 0;
     for (int jobs = 1; jobs <= most_jobs; ++jobs) {
@@ -168,6 +169,7 @@ int bench_command(const BenchOptions& options) {
         player.look(0, false);
         memory = {{"allocations_until_created", at_start}, {"peak_bytes", player.peak_bytes()}};
         draco = draco_rate(player, frames);
+        far = screen_errors(player, frames);
     }
     bool same = true;
     uint64_t frame_allocations = 0;
@@ -182,6 +184,9 @@ int bench_command(const BenchOptions& options) {
                                {"speedup", pass.mean(stage_total) > 0 ? passes[1].mean(stage_total) / pass.mean(stage_total) : 0}});
     }
     for (const Pass& pass : details) frame_allocations += pass.frame_allocations, list.push_back(to_json(pass));
+    nlohmann::json screen = nlohmann::json::array();
+    for (const ScreenError& e : far)
+        screen.push_back({{"diagonals", e.diagonals}, {"triangles_share", e.triangles}, {"mean_pixels", e.mean}, {"p99_pixels", e.p99}, {"max_pixels", e.max}});
     const double rill_rate = passes[1].triangles_per_second(stage_processor), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
     const nlohmann::json json = {
         {"report", "rill bench"},
@@ -195,6 +200,7 @@ int bench_command(const BenchOptions& options) {
         {"output_identical", same},
         {"passes", list},
         {"scaling", scaling},
+        {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
         {"draco",
          {{"bits", 10},
           {"speed", 0},
@@ -210,6 +216,9 @@ int bench_command(const BenchOptions& options) {
         std::printf("output %s; %llu allocations in frames; %s read cold; peak memory %s\n", same ? "identical in all passes" : "DIFFERS between passes",
                     static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
                     readable_bytes(memory["peak_bytes"].get<double>()).c_str());
+        for (const ScreenError& e : far)
+            std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
+                        double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.mean, e.p99, e.max);
         if (draco_rate > 0)
             std::printf("Draco decodes the same meshes at %.2f Mtri/s (10 bits, one core, processor time): Rill runs at %.2f times that\n", draco_rate / 1e6,
                         rill_rate / draco_rate);

@@ -63,6 +63,7 @@ BenchPlayer::BenchPlayer(const std::string& path, int jobs) : path_(path), bytes
     positions_.resize(limits.vertices), normals_.resize(limits.vertices), velocities_.resize(limits.vertices);
     indices_.resize(limits.indices);
     ranges_.resize(65536);
+    look(0, false);
 }
 
 BenchPlayer::~BenchPlayer() {
@@ -72,14 +73,21 @@ BenchPlayer::~BenchPlayer() {
 }
 
 void BenchPlayer::look(float cell_size, bool eighth) {
-    cell_size_ = cell_size, eighth_ = eighth;
+    look_from({info_.upper[0], info_.upper[1], info_.upper[2]}, 1000, 0);
+    from_view_ = eighth;
+    budget_.cell_size = eighth ? std::max(cell_size, info_.cell_size) : cell_size;
+    for (int a = 0; a < 3; ++a) view_.planes[a][a] = 1, view_.planes[a][3] = -(info_.lower[a] + info_.upper[a]) / 2;
+}
+
+void BenchPlayer::look_from(const glm::vec3& eye, float pixels_per_radian, float pixel_error) {
+    from_view_ = true;
+    budget_ = {};
+    budget_.pixel_error = pixel_error;
+    budget_.microseconds = UINT32_MAX;  // no limit, but the stages are timed
     view_ = {};
-    view_.pixels_per_radian = 1000;
+    view_.pixels_per_radian = pixels_per_radian;
     for (auto& plane : view_.planes) plane[3] = 1;
-    for (int a = 0; a < 3; ++a) {
-        view_.eye[a] = info_.upper[a];
-        view_.planes[a][a] = 1, view_.planes[a][3] = -(info_.lower[a] + info_.upper[a]) / 2;
-    }
+    for (int a = 0; a < 3; ++a) view_.eye[a] = eye[a];
 }
 
 BenchFrame BenchPlayer::play(double seconds, float rate, Mesh* mesh) {
@@ -92,9 +100,8 @@ BenchFrame BenchPlayer::play(double seconds, float rate, Mesh* mesh) {
     Frame frame{};
     frame.seconds = seconds, frame.rate = rate;
     frame.asset_to_world[0] = frame.asset_to_world[5] = frame.asset_to_world[10] = 1;
-    frame.budget.microseconds = UINT32_MAX;  // no limit, but the stages are timed
-    frame.budget.cell_size = cell_size_;
-    if (eighth_) frame.views = &view_, frame.view_count = 1, frame.budget.cell_size = std::max(cell_size_, info_.cell_size);
+    frame.budget = budget_;
+    if (from_view_) frame.views = &view_, frame.view_count = 1;
     frame.target = &target;
     frame.wait_for_data = true;
     Stats stats{};

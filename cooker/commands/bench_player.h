@@ -44,6 +44,8 @@ public:
     BenchFrame play(double seconds, float rate, Mesh* mesh = nullptr);
     /// What the frames after this ask for: a cell size (0: the source's), and whether an eighth of the bounds is in sight.
     void look(float cell_size, bool eighth);
+    /// Likewise: all is in sight, from there, in cells of `pixel_error` pixels.
+    void look_from(const glm::vec3& eye, float pixels_per_radian, float pixel_error);
     uint64_t allocations() const { return memory_.allocations; }
     uint64_t peak_bytes() const { return memory_.peak_bytes; }
     uint64_t bytes_read() const { return bytes_read_; }
@@ -58,9 +60,9 @@ private:
     Player* player_ = nullptr;
     AssetInfo info_{};
     uint64_t bytes_read_ = 0;
-    float cell_size_ = 0;
+    Budget budget_{};
     View view_{};
-    bool eighth_ = false;
+    bool from_view_ = false;
     std::vector<glm::vec3> positions_, normals_, velocities_;
     std::vector<uint32_t> indices_;
     std::vector<Range> ranges_;

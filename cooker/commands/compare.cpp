@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <stdlib.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -10,6 +8,7 @@
 #include "commands/commands.h"
 #include "cook.h"
 #include "rivals.h"
+#include "scratch_folder.h"
 #include "verify.h"
 
 namespace rill::cooker {
@@ -128,23 +127,14 @@ nlohmann::json report_json(const std::vector<RateCurve>& curves, const Own& own,
     return json;
 }
 
-/// Where the asset is cooked that --asset did not name.
-struct OwnFolder {
-    std::string path;
-    ~OwnFolder() {
-        std::error_code ignored;
-        if (!path.empty()) std::filesystem::remove_all(path, ignored);
-    }
-};
-std::string cook_one(const CompareOptions& options, OwnFolder& folder) {
-    std::string name = (std::filesystem::temp_directory_path() / "rill-compare-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw InputError(name + ": cannot be made");
-    folder.path = name;
+/// For when --asset named none.
+std::string cook_one(const CompareOptions& options, const ScratchFolder& folder) {
+    const std::string asset = (folder.path / "cooked.rill").string();
     CookSettings settings;
     settings.error = options.error, settings.jobs = options.jobs, settings.read = options.input.checked();
     Progress progress("cook", options.quiet);
-    cook(options.input.path, name + "/cooked.rill", settings, [&](const CookProgress& p) { progress(p.stage, p.frames_done, p.frames_total); });
-    return name + "/cooked.rill";
+    cook(options.input.path, asset, settings, [&](const CookProgress& p) { progress(p.stage, p.frames_done, p.frames_total); });
+    return asset;
 }
 
 int compare_command(const CompareOptions& options) {
@@ -152,7 +142,7 @@ int compare_command(const CompareOptions& options) {
     ReadOptions read = options.input.checked();
     read.first = range.first, read.last = range.last, read.step = range.step;
     const auto source = open_sequence(options.input.path, spread(read, options.input.path));
-    OwnFolder folder;
+    const ScratchFolder folder;
     const std::string asset = options.asset.empty() ? cook_one(options, folder) : options.asset;
     std::vector<size_t> frames(source->info().numbers.size());
     for (size_t i = 0; i < frames.size(); ++i) frames[i] = i;

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
 // OpenVDB: the surface is the zero of a level set, the velocity a vector grid beside it. Built only where the library is.
+// It runs in a process of its own: fuzzed, the library asks for gigabytes within seconds and leaks what it gives up.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
+#include <tbb/global_control.h>
+
 #include <algorithm>
 #include <array>
-#include <mutex>
 
 #include "readers/frame_files.h"
+#include "readers/mesh_in_child.h"
 #include "readers/velocity_names.h"
 
 namespace rill::cooker {
@@ -70,34 +73,35 @@ Mesh mesh_of(const openvdb::FloatGrid& surface) {
     return mesh;
 }
 
+Mesh parse(const std::string& path, const ReadOptions& options) {
+    // Frames are read side by side already; and a thread that is not there needs no memory.
+    const tbb::global_control alone(tbb::global_control::max_allowed_parallelism, 1);
+    openvdb::initialize();
+    openvdb::io::File file(path);
+    file.open(false);  // no delayed loading: damage shows here
+    const openvdb::GridPtrVec grids = *file.getGrids();
+    const openvdb::FloatGrid::Ptr surface = find_surface(grids);
+    if (!surface) throw InputError("no level set; it holds " + listed(grids));
+    Mesh mesh = mesh_of(*surface);
+    const openvdb::Vec3SGrid::Ptr velocity = find_velocity(grids, options.velocity_name);
+    if (!velocity && !options.velocity_name.empty())
+        throw InputError("no vector grid '" + options.velocity_name + "'; it holds " + listed(grids));
+    if (!velocity || mesh.positions.empty()) return mesh;
+    const std::vector<glm::vec3> normals = vertex_normals(mesh);
+    const float inside = float(surface->voxelSize().x());
+    if (velocity->getGridClass() == openvdb::GRID_STAGGERED) sample<openvdb::tools::StaggeredBoxSampler>(mesh, *velocity, normals, inside);
+    else sample<openvdb::tools::BoxSampler>(mesh, *velocity, normals, inside);
+    return mesh;
+}
+
 }  // namespace
 
 Mesh read_vdb(const std::filesystem::path& path, const ReadOptions& options) {
-    static std::once_flag started;
-    std::call_once(started, [] { openvdb::initialize(); });
-    try {
-        openvdb::io::File file(path.string());
-        file.open(false);  // no delayed loading: damage shows here
-        const openvdb::GridPtrVec grids = *file.getGrids();
-        const openvdb::FloatGrid::Ptr surface = find_surface(grids);
-        if (!surface) throw InputError(path.string() + ": no level set; it holds " + listed(grids));
-        Mesh mesh = mesh_of(*surface);
-        const openvdb::Vec3SGrid::Ptr velocity = find_velocity(grids, options.velocity_name);
-        if (!velocity && !options.velocity_name.empty())
-            throw InputError(path.string() + ": no vector grid '" + options.velocity_name + "'; it holds " + listed(grids));
-        if (!velocity || mesh.positions.empty()) return mesh;
-        const std::vector<glm::vec3> normals = vertex_normals(mesh);
-        const float inside = float(surface->voxelSize().x());
-        if (velocity->getGridClass() == openvdb::GRID_STAGGERED) sample<openvdb::tools::StaggeredBoxSampler>(mesh, *velocity, normals, inside);
-        else sample<openvdb::tools::BoxSampler>(mesh, *velocity, normals, inside);
-        return mesh;
-    } catch (const InputError&) {
-        throw;
-    } catch (const std::exception& error) {  // the library's own, and out of memory on a damaged file
-        std::string cause = error.what();
-        std::replace(cause.begin(), cause.end(), '\n', ' ');
-        throw InputError(path.string() + ": not a usable OpenVDB file: " + cause);
-    }
+    std::error_code error;
+    const uint64_t size = std::filesystem::file_size(path, error);
+    if (error) throw InputError(path.string() + ": " + error.message());
+    const ChildLimits limits = {(uint64_t(1) << 30) + 64 * size, uint32_t(60 + (size >> 20))};  // tiles and packed leaves unfold
+    return mesh_in_child(path, limits, [&] { return parse(path.string(), options); });
 }
 
 }  // namespace rill::cooker

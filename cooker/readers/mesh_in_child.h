@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// For libraries that are not made for hostile bytes: they read in a process of their own, so that a crash, a hang or a
+// hunger for memory there is one more InputError here.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+
+#include "mesh.h"
+
+namespace rill::cooker {
+
+struct ChildLimits {
+    uint64_t memory;    ///< bytes, on top of what this process holds
+    uint32_t seconds;   ///< of processor time
+};
+/// What `work` returns, called in a child process; all else that it does is lost. Throws InputError naming `path` when it
+/// throws, crashes or goes beyond a limit. Any thread; `work` must not need locks that other threads may hold.
+Mesh mesh_in_child(const std::filesystem::path& path, const ChildLimits& limits, const std::function<Mesh()>& work);
+
+}  // namespace rill::cooker
