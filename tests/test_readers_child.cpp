@@ -51,7 +51,7 @@ TEST_CASE("a crash, an endless loop and a hunger for memory end there") {
         return {};
     };
     CHECK(cause_of([]() -> Mesh { std::_Exit(3); }) == "f1.vdb: not usable: reading it crashes");
-    CHECK(cause_of([]() -> Mesh { std::raise(SIGKILL); }) == "f1.vdb: not usable: reading it crashes");
+    CHECK(cause_of([] { return std::raise(SIGKILL) ? Mesh() : Mesh(); }) == "f1.vdb: not usable: reading it crashes");
     CHECK(cause_of(forever, {usual.memory, 1}) == "f1.vdb: not usable: reading takes too long");
     const auto eat = [] {
         Mesh mesh;
