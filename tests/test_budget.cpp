@@ -41,7 +41,8 @@ struct HostileCamera {
     glm::vec3 anywhere() { return {uniform(), uniform(), uniform()}; }
     void step(int frame) {
         if (frame % 50 == 0) {
-            eye = glm::normalize(anywhere()) * std::exp2(1.6f + 1.4f * uniform());
+            const float away = std::exp2(1.6f + 1.4f * uniform());
+            eye = away * glm::normalize(anywhere());
             at = 0.8f * anywhere();
             half_angle = 0.35f + 0.25f * uniform();
             drift = 0.03f * anywhere();
@@ -110,7 +111,7 @@ TEST_CASE("2000 frames of a hostile camera keep their time") {
     for (double us : free.microseconds) used += std::min(us / budget, 1.0);
     MESSAGE("budget ", budget, " us; unbounded p50 ", sorted[sorted.size() / 2], " max ", sorted.back(), "; over in ", over,
             " of 2000, at most ", worst, " of it; mean use ", spent / 2000, ", could be ", used / 400);
-    CHECK(sorted.back() > 2 * budget);
+    CHECK(sorted.back() > 1.5 * budget);  // there is something to hold back
     CHECK(over < 20);
     CHECK(worst < 1.2);
     CHECK(spent / 2000 > 0.5 * used / 400);  // not by giving up more than need be
