@@ -13,6 +13,7 @@
 #include "format/entropy_decoder.h"
 #include "format/fourier_extension.h"
 #include "format/lattice.h"
+#include "format/layout.h"
 
 namespace rill::format {
 
@@ -33,6 +34,37 @@ inline int64_t rounded_division(int64_t a, int64_t b) {
     return (a >= 0 ? a + b / 2 : a - b / 2) / b;
 }
 
+/// The orthonormal polynomials of degree 1 … 3 on a life's samples, times √samples, in 1/4096: near enough to the
+/// first terms of both bases to carry motion from one life to another, and integers on every machine.
+inline constexpr uint32_t carried_terms = 3;
+struct Polynomials {
+    static constexpr uint32_t most = max_window_samples;
+    int16_t value[most * (most + 1) / 2][carried_terms] = {};
+    constexpr const int16_t (*of(uint32_t samples) const)[carried_terms] { return value + samples * (samples - 1) / 2; }
+};
+constexpr int64_t whole_root(int64_t x) {
+    int64_t root = 0;
+    for (int64_t bit = int64_t(1) << 31; bit > 0; bit >>= 1)
+        if ((root + bit) * (root + bit) <= x) root += bit;
+    return root;
+}
+inline constexpr Polynomials polynomials = [] {
+    Polynomials out;
+    for (int64_t n = 2; n <= Polynomials::most; ++n) {
+        const int64_t one = n * n - 1, two = one * (n * n - 4), three = two * (n * n - 9), unit = int64_t(1) << 60;
+        const int64_t norm[3] = {whole_root(3 * unit / one), n > 2 ? whole_root(5 * unit / (4 * two)) : 0,
+                                 n > 3 ? whole_root(7 * unit / (4 * three)) : 0};
+        for (int64_t s = 0; s < n; ++s) {
+            const int64_t u = 2 * s - n + 1;
+            const int64_t p[3] = {u, 3 * u * u - one, 5 * u * u * u - u * (3 * n * n - 7)};
+            for (int k = 0; k < 3; ++k) out.value[n * (n - 1) / 2 + s][k] = int16_t((p[k] * norm[k] + (1 << 17)) >> 18);
+        }
+    }
+    return out;
+}();
+/// Of term k of a basis against the polynomial of that degree.
+constexpr int32_t polynomial_sign(uint32_t k, uint32_t flags) { return (flags & track_cosine ? k == 2 : k == 1) ? 1 : -1; }
+
 /// What is being coded by a signed value.
 enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, along, axis_delta, kinds };
 
@@ -47,7 +79,7 @@ struct Statistics {
     Counter mantissa[kinds][24], escape[24];
     Counter split_small[9][9], split_empty[2][16], split_tree[8][16];
     Counter leaf[Mixer::inputs][leaf_contexts];
-    Counter flag[4][12], birth[128], death[128], same_birth[2], same_death[2];
+    Counter flag[2][12], cosine[2][16], fine, birth[128], length[128], at_border[2];
     Counter more[4][Mixer::inputs][more_contexts];
     Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4];
     /// How far predictions were right: Σ value · prediction / Σ prediction², in 1/256; drawn up anew now and then.
@@ -55,7 +87,16 @@ struct Statistics {
         int64_t product = 1 << 17, square = 1 << 18;
         int32_t factor = 128;
         uint32_t seen = 0;
-    } trust[kinds][6];
+        void learn(int64_t was, int64_t said) {
+            was = was < -32768 ? -32768 : was > 32768 ? 32768 : was;
+            said = said < -(1 << 23) ? -(1 << 23) : said > 1 << 23 ? 1 << 23 : said;
+            product += (was * said * 256 - product) / 32;
+            square += (said * said - square) / 32;
+            if (seen++ % 8) return;
+            const int64_t ratio = product * 256 / (square + 1);
+            factor = int32_t(ratio < 0 ? 0 : ratio > 256 ? 256 : ratio);
+        }
+    } trust[kinds][carried_terms + 1];
 };
 
 template <class Coder>
@@ -136,6 +177,7 @@ private:
 
     // ---- neighbours --------------------------------------------------------------------------------
     static constexpr uint32_t window = 128, nearest = 3, rest_terms = 12;
+    static constexpr int32_t share[nearest + 1] = {0, 65536, 32768, 21845};  ///< of so many, in 1/65536
     struct Near {
         uint32_t count = 0;
         uint32_t slot[nearest];
@@ -145,7 +187,7 @@ private:
     struct Recent {
         uint32_t count = 0;              ///< slots in use
         int16_t place[3][window];        ///< mean positions, coarse
-        uint32_t life[window];           ///< birth, death, basis
+        bool moves[window];              ///< lives for more than a sample
         int32_t mean[window][3];         ///< step/16
         int16_t normal[window][3];       ///< of points, 1/16384
         uint32_t track[window];
@@ -156,14 +198,12 @@ private:
     static int64_t weight_of(const Near& near, uint32_t j) {
         return 1 + 1024 * (int64_t(near.distance[0]) + 1) / (int64_t(near.distance[j]) + 1);
     }
-    static uint32_t life_key(uint32_t birth, uint32_t death, uint32_t flags) {
-        return birth | death << 8 | (flags & track_cosine) << 16;
-    }
     void begin_search(const int32_t (&low)[3], const uint8_t (&bits)[3]);
     void coarse_place(const int64_t (&x)[3], int16_t (&out)[3]) const;
     void remember(uint32_t index, const RawTrack& t, const Frame& frame);
     void measure(const int64_t (&x)[3]);
-    Near find_near(bool like, uint32_t life) const;
+    template <class Accept>
+    Near find_near(const Accept& accept) const;
 
     // ---- parts of a track --------------------------------------------------------------------------
     struct Box {
@@ -183,12 +223,23 @@ private:
     bool life(RawTrack& t, const Near& near, const RawTrack* source);
     bool axis(RawTrack& t, const Near& near, const RawTrack* source);
     void along_axis(RawTrack& t, const Frame& frame, const Near& near, const RawTrack* source);
-    bool series(RawTrack& t, const Frame& frame, bool second, const Near& near, const Near& like,
-                const RawTrack* source);
-    bool turned_term(const RawTrack& t, const Frame& frame, bool second, uint32_t other, uint32_t k,
-                     int64_t (&out)[3]) const;
-    bool term(const RawTrack& t, const Frame& frame, bool second, const Near& like, uint32_t k,
-              int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted, int32_t* out);
+    /// Predictions of one coefficient by the neighbours, in 1/256 of it.
+    struct Said {
+        int64_t mean = 0;
+        uint32_t size = 0, spread = 0;  ///< classes
+    };
+    /// A channel group while it is coded; residuals of the last two terms.
+    struct Terms {
+        const Near& moving;  ///< the nearest that live for more than a sample
+        bool second;
+        uint32_t channels;
+        int32_t previous[6], before[6];
+    };
+    void carry(const RawTrack& t, const Frame& frame, const Near& moving);
+    Said said(const Near& moving, uint32_t k, uint32_t channel) const;
+    Contexts series_contexts(const RawTrack& t, const Terms& terms, Said about, uint32_t k, uint32_t c, uint32_t others) const;
+    bool term(const RawTrack& t, Terms& terms, uint32_t k, const int32_t* wanted, int32_t* out);
+    bool series(RawTrack& t, bool second, const Near& moving, const RawTrack* source);
 
     Statistics& learned_;
     Coder& coder_;
@@ -200,6 +251,7 @@ private:
     uint32_t first_ = 0, done_ = 0, used_ = 0;
     bool drops_ = false;
     uint8_t rest_[2][rest_terms][3];  ///< of the track at hand
+    int64_t carried_[nearest][carried_terms][3];  ///< its motion as its neighbours' says, terms 1 …, in 1/256
     Recent recent_;
     int64_t search_low_[3];
     uint32_t search_shift_ = 0;
@@ -207,5 +259,6 @@ private:
 };
 
 #include "format/chunk_model_parts.h"
+#include "format/chunk_model_series.h"
 
 }  // namespace rill::format
