@@ -10,10 +10,11 @@
 #include <array>
 #include <cstdint>
 
+#include "format/carried_motion.h"
+#include "format/chunk_statistics.h"
 #include "format/entropy_decoder.h"
 #include "format/fourier_extension.h"
 #include "format/lattice.h"
-#include "format/layout.h"
 
 namespace rill::format {
 
@@ -33,71 +34,6 @@ inline int64_t rounded_division(int64_t a, int64_t b) {
     if (b < 0) a = -a, b = -b;
     return (a >= 0 ? a + b / 2 : a - b / 2) / b;
 }
-
-/// The orthonormal polynomials of degree 1 … 3 on a life's samples, times √samples, in 1/4096: near enough to the
-/// first terms of both bases to carry motion from one life to another, and integers on every machine.
-inline constexpr uint32_t carried_terms = 3;
-struct Polynomials {
-    static constexpr uint32_t most = max_window_samples;
-    int16_t value[most * (most + 1) / 2][carried_terms] = {};
-    constexpr const int16_t (*of(uint32_t samples) const)[carried_terms] { return value + samples * (samples - 1) / 2; }
-};
-constexpr int64_t whole_root(int64_t x) {
-    int64_t root = 0;
-    for (int64_t bit = int64_t(1) << 31; bit > 0; bit >>= 1)
-        if ((root + bit) * (root + bit) <= x) root += bit;
-    return root;
-}
-inline constexpr Polynomials polynomials = [] {
-    Polynomials out;
-    for (int64_t n = 2; n <= Polynomials::most; ++n) {
-        const int64_t one = n * n - 1, two = one * (n * n - 4), three = two * (n * n - 9), unit = int64_t(1) << 60;
-        const int64_t norm[3] = {whole_root(3 * unit / one), n > 2 ? whole_root(5 * unit / (4 * two)) : 0,
-                                 n > 3 ? whole_root(7 * unit / (4 * three)) : 0};
-        for (int64_t s = 0; s < n; ++s) {
-            const int64_t u = 2 * s - n + 1;
-            const int64_t p[3] = {u, 3 * u * u - one, 5 * u * u * u - u * (3 * n * n - 7)};
-            for (int k = 0; k < 3; ++k) out.value[n * (n - 1) / 2 + s][k] = int16_t((p[k] * norm[k] + (1 << 17)) >> 18);
-        }
-    }
-    return out;
-}();
-/// Of term k of a basis against the polynomial of that degree.
-constexpr int32_t polynomial_sign(uint32_t k, uint32_t flags) { return (flags & track_cosine ? k == 2 : k == 1) ? 1 : -1; }
-
-/// What is being coded by a signed value.
-enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, along, axis_delta, kinds };
-
-/// All that adapts while a chunk is coded.
-struct Statistics {
-    static constexpr uint32_t bins = 8;  ///< of a value: zero, unary magnitude class up to 8
-    static constexpr uint32_t contexts[Mixer::inputs] = {48, 49, 40, 48};  ///< per kind
-    static constexpr uint32_t all_contexts = 48 + 49 + 40 + 48;
-    static constexpr uint32_t more_contexts = 72, leaf_contexts = 78;
-
-    Counter values[kinds * all_contexts * bins];
-    Counter mantissa[kinds][24], escape[24];
-    Counter split_small[9][9], split_empty[2][16], split_tree[8][16];
-    Counter leaf[Mixer::inputs][leaf_contexts];
-    Counter flag[2][12], cosine[2][16], fine, birth[128], length[128], at_border[2];
-    Counter more[4][Mixer::inputs][more_contexts];
-    Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4];
-    /// How far predictions were right: Σ value · prediction / Σ prediction², in 1/256; drawn up anew now and then.
-    struct Trust {
-        int64_t product = 1 << 17, square = 1 << 18;
-        int32_t factor = 128;
-        uint32_t seen = 0;
-        void learn(int64_t was, int64_t said) {
-            was = was < -32768 ? -32768 : was > 32768 ? 32768 : was;
-            said = said < -(1 << 23) ? -(1 << 23) : said > 1 << 23 ? 1 << 23 : said;
-            product += (was * said * 256 - product) / 32;
-            square += (said * said - square) / 32;
-            if (seen++ % 8) return;
-            const int64_t ratio = product * 256 / (square + 1);
-            factor = int32_t(ratio < 0 ? 0 : ratio > 256 ? 256 : ratio);
-        }
-    } trust[kinds][carried_terms + 1];
-};
 
 template <class Coder>
 class ChunkModel {
@@ -235,11 +171,11 @@ private:
         uint32_t channels;
         int32_t previous[6], before[6];
     };
-    void carry(const RawTrack& t, const Frame& frame, const Near& moving);
+    void carry(const RawTrack& t, const Frame& frame, uint32_t terms, const Near& moving);
     Said said(const Near& moving, uint32_t k, uint32_t channel) const;
     Contexts series_contexts(const RawTrack& t, const Terms& terms, Said about, uint32_t k, uint32_t c, uint32_t others) const;
     bool term(const RawTrack& t, Terms& terms, uint32_t k, const int32_t* wanted, int32_t* out);
-    bool series(RawTrack& t, bool second, const Near& moving, const RawTrack* source);
+    bool series(RawTrack& t, const Frame& frame, bool second, const Near& moving, const RawTrack* source);
 
     Statistics& learned_;
     Coder& coder_;

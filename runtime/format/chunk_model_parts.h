@@ -303,11 +303,10 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
     }
     std::memset(rest_, 0, sizeof rest_);
     const Near moving = find_near([&](uint32_t slot) { return recent_.moves[slot]; });
-    carry(t, frame, moving);
     if (!drops_) coder_.category(bits_motion);
-    if (!series(t, false, moving, source)) return false;
+    if (!series(t, frame, false, moving, source)) return false;
     if (!drops_) coder_.category(bits_normals);
-    if (!series(t, true, moving, source)) return false;
+    if (!series(t, frame, true, moving, source)) return false;
     const uint32_t size = coefficients_of(t, drops_);
     if (size > block_.coefficient_count - used_) {
         reason = "more coefficients than the directory says";

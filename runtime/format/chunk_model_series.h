@@ -2,35 +2,37 @@
 // The time coefficients in ChunkModel, included by chunk_model.h inside its namespace.
 
 /// Motion of the neighbours on this track's life, in its channels: their first terms as polynomials, at the speed of
-/// their ends beyond them.
+/// their ends beyond them. Its first `terms` terms, if as many are carried.
 template <class Coder>
-void ChunkModel<Coder>::carry(const RawTrack& t, const Frame& frame, const Near& moving) {
+void ChunkModel<Coder>::carry(const RawTrack& t, const Frame& frame, uint32_t terms, const Near& moving) {
     const uint32_t life = t.death - t.birth + 1u;
+    terms = at_most(terms, carried_terms);
     const auto* to = polynomials.of(life);
     for (uint32_t j = 0; j < moving.count; ++j) {
         const Track& from = block_.tracks[recent_.track[moving.slot[j]]];
         const auto* at = polynomials.of(from.death - from.birth + 1u);
+        const uint32_t known = at_most(from.position_terms - 1u, carried_terms);
         int64_t c[carried_terms][3] = {}, place[3] = {}, sum[carried_terms][3] = {};
-        for (uint32_t k = 1; k <= carried_terms && k < from.position_terms; ++k)
+        for (uint32_t k = 1; k <= known; ++k)
             for (uint32_t a = 0; a < 3; ++a)
                 c[k - 1][a] = load(block_.coefficients + from.first_coefficient + 3 * k + a) * polynomial_sign(k, from.flags);
         for (uint32_t s = 1; s < life; ++s) {
             const int32_t when = t.birth + int32_t(s) - from.birth, last = from.death - from.birth;
             const int32_t end = when < 1 ? 1 : when > last ? last : when;
-            for (uint32_t k = 0; k < carried_terms; ++k)
+            for (uint32_t k = 0; k < known; ++k)
                 for (int a = 0; a < 3; ++a) place[a] += c[k][a] * (at[end][k] - at[end - 1][k]);
-            for (int a = 0; a < 3; ++a)
-                for (uint32_t k = 0; k < carried_terms; ++k) sum[k][a] += (place[a] >> 12) * to[s][k];
+            for (uint32_t k = 0; k < terms; ++k)
+                for (int a = 0; a < 3; ++a) sum[k][a] += (place[a] >> 12) * to[s][k];
         }
-        for (uint32_t k = 0; k < carried_terms; ++k) {
+        for (uint32_t k = 0; k < terms; ++k) {
             int64_t v[3];
             for (int a = 0; a < 3; ++a) {
                 v[a] = (sum[k][a] >> 12) / life * polynomial_sign(k + 1, t.flags);
                 v[a] = v[a] < -max_mean ? -max_mean : v[a] > max_mean ? max_mean : v[a];
             }
-            for (int c2 = 0; c2 < 3; ++c2) {
-                const int64_t turned = (v[0] * frame.row[c2][0] + v[1] * frame.row[c2][1] + v[2] * frame.row[c2][2]) >> 14;
-                carried_[j][k][c2] = c2 == 2 || drops_ || t.flags & track_fine ? turned : turned * coarse_scale_ >> 16;
+            for (int b = 0; b < 3; ++b) {
+                const int64_t turned = (v[0] * frame.row[b][0] + v[1] * frame.row[b][1] + v[2] * frame.row[b][2]) >> 14;
+                carried_[j][k][b] = b == 2 || drops_ || t.flags & track_fine ? turned : turned * coarse_scale_ >> 16;
             }
         }
     }
@@ -119,7 +121,7 @@ bool ChunkModel<Coder>::term(const RawTrack& t, Terms& terms, uint32_t k, const 
 
 /// The time coefficients of one channel group, term by term.
 template <class Coder>
-bool ChunkModel<Coder>::series(RawTrack& t, bool second, const Near& moving, const RawTrack* source) {
+bool ChunkModel<Coder>::series(RawTrack& t, const Frame& frame, bool second, const Near& moving, const RawTrack* source) {
     Terms terms{moving, second, drops_ && second ? 6u : 3u, {}, {}};
     const uint32_t start = drops_ && second ? 0 : 1, group = drops_ * 2u + second, life = t.death - t.birth + 1u;
     const uint32_t limit = most_terms(life, (t.flags & track_cosine) != 0);
@@ -142,6 +144,7 @@ bool ChunkModel<Coder>::series(RawTrack& t, bool second, const Near& moving, con
                  &learned_.more[group][2][now * 12 + left], &learned_.more[group][3][positions * 12 + place], wanted_terms > k))
             break;
         count = k + 1;
+        if (!second && k == 1) carry(t, frame, limit - 1, moving);
         const int32_t* wanted = source ? (second ? source->second[k] : source->position[k]) : none;
         if (!term(t, terms, k, wanted, second ? t.second[k] : t.position[k])) return false;
     }
