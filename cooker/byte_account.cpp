@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "format/chunk_walk.h"
 #include "mesh.h"
@@ -38,8 +39,9 @@ Bits bits_of(const AssetDirectory& directory, uint32_t index, uint32_t samples) 
     if (bytes.size() >= format::lattice_steps_bytes) {
         const format::LatticeSteps steps = format::read_steps(bytes.data());
         CountingDecoder coder(bytes.data() + format::lattice_steps_bytes, bytes.data() + bytes.size());
-        why = valid(steps) ? format::walk_chunk(coder, steps, {samples, record.point_count, record.drop_count, record.coefficient_count}, block)
-                           : "its steps are not sensible";
+        const format::ChunkShape shape{samples, record.point_count, record.drop_count, record.coefficient_count};
+        const auto learned = std::make_unique<format::Statistics>(format::first_statistics);
+        why = valid(steps) ? format::walk_chunk(coder, steps, shape, block, *learned) : "its steps are not sensible";
         if (!why) return coder.spent;
     }
     throw InputError(directory.path + ": damaged: chunk " + std::to_string(index) + ": " + why);

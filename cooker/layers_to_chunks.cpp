@@ -134,7 +134,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
 
     double spent[format::bit_categories] = {};
     RangeEncoder coder(out.bytes, spent);
-    const auto learned = std::make_unique<format::Statistics>();
+    const auto learned = std::make_unique<format::Statistics>(format::first_statistics);
     const auto model = std::make_unique<Model>(coder, steps, window_samples, *learned, block);
     for (int s = 0; s < 2; ++s) {
         const Set& set = sets[s];

@@ -24,7 +24,7 @@ WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
     const float t = float(tolerance);
     goal.tolerance = t;
-    goal.quantiser = {0.3f * t, 3.f, 0.045f, 0.2f * t, 0.045f};
+    goal.quantiser = {0.3f * t, 4.f, 0.045f, 0.2f * t, 0.045f};
     goal.origin = facts.lower;
     goal.jobs = jobs;
     return goal;

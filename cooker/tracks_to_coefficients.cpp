@@ -18,6 +18,8 @@ constexpr uint32_t max_terms = format::max_terms;
 
 /// Coefficients below this fraction of a step are dropped: they cost more than they mend.
 constexpr double dead_zone = 0.62;
+/// Others are rounded down up to this fraction: what it takes away is mostly the noise of the source's cells.
+constexpr double rounded_up_from = 0.75;
 /// Normals that lean further than this from the axis are kept as vectors, else as points of the plane at 1.
 constexpr double least_planar = 0.4;
 /// A life with a normal further than this from the axis has no tangential slack.
@@ -71,8 +73,9 @@ int32_t checked(double value) {
     return int32_t(std::lround(value));
 }
 int32_t quantised(double value, double step) {
-    const double v = value / step;
-    return std::abs(v) < dead_zone ? 0 : checked(v);
+    const double v = std::abs(value / step);
+    if (v < dead_zone) return 0;
+    return checked(std::copysign(std::max(1.0, std::floor(v + 1 - rounded_up_from)), value));
 }
 
 /// Bits of a coefficient, roughly, and what a squared error of one step is worth in bits (the slope of the

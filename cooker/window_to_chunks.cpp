@@ -9,7 +9,7 @@
 namespace rill::cooker {
 namespace {
 
-constexpr uint32_t most_tracks_per_block = 1500;
+constexpr uint32_t most_tracks_per_block = 3000;
 
 void add(ChunkBits& sum, const ChunkBits& more) {
     sum.structure += more.structure, sum.births += more.births, sum.motion += more.motion;

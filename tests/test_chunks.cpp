@@ -201,10 +201,10 @@ TEST_CASE("lives of every length keep the promised error") {
             const TrackSamples back = dequantise_track(q, quantiser, origin, tables());
             REQUIRE(back.position.size() == life);
             INFO("life ", life, " repeat ", repeat);
-            // Truncation, half a step of the mean, and the dead zone (.62 of a coefficient step) in every term, which
-            // in the norm add up as a root; 1.5 for the ends, where basis functions are larger.
+            // Truncation, half a step of the mean, and what rounding takes (.75 of a coefficient step) in every term, which
+            // in the norm add up as a root; 1.7 for the ends, where basis functions are larger.
             const double terms = format::most_terms(life, (q.flags & format::track_cosine) != 0);
-            const auto noise = [&](double gain) { return float(0.5 + 1.5 * 0.62 * gain * std::sqrt(terms)); };
+            const auto noise = [&](double gain) { return float(0.5 + 1.7 * 0.75 * gain * std::sqrt(terms)); };
             const float bound = quantiser.time_tolerance + quantiser.step * noise(format::position_gain);
             const float normal_bound =
                 quantiser.normal_tolerance + quantiser.normal_step * noise(format::normal_gain);

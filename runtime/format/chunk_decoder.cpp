@@ -11,7 +11,8 @@ const char* decode(const uint8_t* bytes, size_t size, const ChunkShape& shape, T
     const LatticeSteps steps = read_steps(bytes);
     if (!valid(steps)) return "the chunk's steps are not sensible";
     RangeDecoder coder(bytes + lattice_steps_bytes, bytes + size);
-    if (const char* why = walk_chunk(coder, steps, shape, block)) return why;
+    Statistics learned = first_statistics;
+    if (const char* why = walk_chunk(coder, steps, shape, block, learned)) return why;
     finish_block(steps, block);
     return nullptr;
 }

@@ -10,6 +10,8 @@
 #include <array>
 #include <cstdint>
 
+#include "format/carried_motion.h"
+#include "format/chunk_statistics.h"
 #include "format/entropy_decoder.h"
 #include "format/fourier_extension.h"
 #include "format/lattice.h"
@@ -32,31 +34,6 @@ inline int64_t rounded_division(int64_t a, int64_t b) {
     if (b < 0) a = -a, b = -b;
     return (a >= 0 ? a + b / 2 : a - b / 2) / b;
 }
-
-/// What is being coded by a signed value.
-enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, along, axis_delta, kinds };
-
-/// All that adapts while a chunk is coded.
-struct Statistics {
-    static constexpr uint32_t bins = 8;  ///< of a value: zero, unary magnitude class up to 8
-    static constexpr uint32_t contexts[Mixer::inputs] = {48, 49, 40, 48};  ///< per kind
-    static constexpr uint32_t all_contexts = 48 + 49 + 40 + 48;
-    static constexpr uint32_t more_contexts = 72, leaf_contexts = 78;
-
-    Counter values[kinds * all_contexts * bins];
-    Counter mantissa[kinds][24], escape[24];
-    Counter split_small[9][9], split_empty[2][16], split_tree[8][16];
-    Counter leaf[Mixer::inputs][leaf_contexts];
-    Counter flag[4][12], birth[128], death[128], same_birth[2], same_death[2];
-    Counter more[4][Mixer::inputs][more_contexts];
-    Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4];
-    /// How far predictions were right: Σ value · prediction / Σ prediction², in 1/256; drawn up anew now and then.
-    struct Trust {
-        int64_t product = 1 << 17, square = 1 << 18;
-        int32_t factor = 128;
-        uint32_t seen = 0;
-    } trust[kinds][6];
-};
 
 template <class Coder>
 class ChunkModel {
@@ -136,6 +113,7 @@ private:
 
     // ---- neighbours --------------------------------------------------------------------------------
     static constexpr uint32_t window = 128, nearest = 3, rest_terms = 12;
+    static constexpr int32_t share[nearest + 1] = {0, 65536, 32768, 21845};  ///< of so many, in 1/65536
     struct Near {
         uint32_t count = 0;
         uint32_t slot[nearest];
@@ -145,7 +123,7 @@ private:
     struct Recent {
         uint32_t count = 0;              ///< slots in use
         int16_t place[3][window];        ///< mean positions, coarse
-        uint32_t life[window];           ///< birth, death, basis
+        bool moves[window];              ///< lives for more than a sample
         int32_t mean[window][3];         ///< step/16
         int16_t normal[window][3];       ///< of points, 1/16384
         uint32_t track[window];
@@ -156,14 +134,12 @@ private:
     static int64_t weight_of(const Near& near, uint32_t j) {
         return 1 + 1024 * (int64_t(near.distance[0]) + 1) / (int64_t(near.distance[j]) + 1);
     }
-    static uint32_t life_key(uint32_t birth, uint32_t death, uint32_t flags) {
-        return birth | death << 8 | (flags & track_cosine) << 16;
-    }
     void begin_search(const int32_t (&low)[3], const uint8_t (&bits)[3]);
     void coarse_place(const int64_t (&x)[3], int16_t (&out)[3]) const;
     void remember(uint32_t index, const RawTrack& t, const Frame& frame);
     void measure(const int64_t (&x)[3]);
-    Near find_near(bool like, uint32_t life) const;
+    template <class Accept>
+    Near find_near(const Accept& accept) const;
 
     // ---- parts of a track --------------------------------------------------------------------------
     struct Box {
@@ -183,12 +159,23 @@ private:
     bool life(RawTrack& t, const Near& near, const RawTrack* source);
     bool axis(RawTrack& t, const Near& near, const RawTrack* source);
     void along_axis(RawTrack& t, const Frame& frame, const Near& near, const RawTrack* source);
-    bool series(RawTrack& t, const Frame& frame, bool second, const Near& near, const Near& like,
-                const RawTrack* source);
-    bool turned_term(const RawTrack& t, const Frame& frame, bool second, uint32_t other, uint32_t k,
-                     int64_t (&out)[3]) const;
-    bool term(const RawTrack& t, const Frame& frame, bool second, const Near& like, uint32_t k,
-              int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted, int32_t* out);
+    /// Predictions of one coefficient by the neighbours, in 1/256 of it.
+    struct Said {
+        int64_t mean = 0;
+        uint32_t size = 0, spread = 0;  ///< classes
+    };
+    /// A channel group while it is coded; residuals of the last two terms.
+    struct Terms {
+        const Near& moving;  ///< the nearest that live for more than a sample
+        bool second;
+        uint32_t channels;
+        int32_t previous[6], before[6];
+    };
+    void carry(const RawTrack& t, const Frame& frame, uint32_t terms, const Near& moving);
+    Said said(const Near& moving, uint32_t k, uint32_t channel) const;
+    Contexts series_contexts(const RawTrack& t, const Terms& terms, Said about, uint32_t k, uint32_t c, uint32_t others) const;
+    bool term(const RawTrack& t, Terms& terms, uint32_t k, const int32_t* wanted, int32_t* out);
+    bool series(RawTrack& t, const Frame& frame, bool second, const Near& moving, const RawTrack* source);
 
     Statistics& learned_;
     Coder& coder_;
@@ -200,6 +187,7 @@ private:
     uint32_t first_ = 0, done_ = 0, used_ = 0;
     bool drops_ = false;
     uint8_t rest_[2][rest_terms][3];  ///< of the track at hand
+    int64_t carried_[nearest][carried_terms][3];  ///< its motion as its neighbours' says, terms 1 …, in 1/256
     Recent recent_;
     int64_t search_low_[3];
     uint32_t search_shift_ = 0;
@@ -207,5 +195,6 @@ private:
 };
 
 #include "format/chunk_model_parts.h"
+#include "format/chunk_model_series.h"
 
 }  // namespace rill::format

@@ -55,7 +55,7 @@ void ChunkModel<Coder>::remember(uint32_t index, const RawTrack& t, const Frame&
     }
     coarse_place(mean, place);
     for (int c = 0; c < 3; ++c) recent_.place[c][slot] = place[c];
-    recent_.life[slot] = life_key(t.birth, t.death, t.flags);
+    recent_.moves[slot] = t.birth < t.death;
     recent_.track[slot] = index;
     std::memcpy(recent_.rest[slot], rest_, sizeof rest_);
     if (recent_.count < window) ++recent_.count;
@@ -73,14 +73,15 @@ void ChunkModel<Coder>::measure(const int64_t (&x)[3]) {
     }
 }
 
-/// The nearest of the last measure(), ties by slot; `like`: only those of this life and basis.
+/// The nearest of the last measure() whose slot is accepted, ties by slot.
 template <class Coder>
-typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_near(bool like, uint32_t life) const {
+template <class Accept>
+typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_near(const Accept& accept) const {
     Near near;
     uint32_t limit = UINT32_MAX;
     for (uint32_t i = 0; i < recent_.count; ++i) {
         const uint32_t d = distance_[i];
-        if (d >= limit || (like && recent_.life[i] != life)) continue;
+        if (d >= limit || !accept(i)) continue;
         uint32_t at = near.count < nearest ? near.count++ : nearest - 1;
         for (; at > 0 && d < near.distance[at - 1]; --at)
             near.distance[at] = near.distance[at - 1], near.slot[at] = near.slot[at - 1];
@@ -138,7 +139,7 @@ void ChunkModel<Coder>::leaf(Box& box, const RawTrack* source) {
         for (int c = 0; c < 3; ++c)
             centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
         measure(centre);
-        const Near near = find_near(false, 0);
+        const Near near = find_near([](uint32_t) { return true; });
         planes.count = near.count;
         for (uint32_t j = 0; j < near.count; ++j)
             for (int c = 0; c < 3; ++c) {
@@ -170,27 +171,23 @@ bool ChunkModel<Coder>::life(RawTrack& t, const Near& near, const RawTrack* sour
     const uint32_t wanted = source ? source->flags : 0;
     if (bit(learned_.flag[0][set + context], wanted & track_born)) t.flags |= track_born;
     if (bit(learned_.flag[1][set + context], (wanted & track_dies) != 0)) t.flags |= track_dies;
-    const uint32_t born = t.flags & track_born, dies = (t.flags & track_dies) / track_dies;
-
-    const uint32_t likely_birth = like && (like->flags & 1u) == born ? like->birth : 0;
-    if (bit(learned_.same_birth[born], source && source->birth == likely_birth))
-        t.birth = uint8_t(likely_birth);
+    const bool born = t.flags & track_born, dies = t.flags & track_dies;
+    if (!born && bit(learned_.at_border[0], source && source->birth == 0))
+        t.birth = 0;
     else
         t.birth = uint8_t(tree(learned_.birth, 7, source ? source->birth : 0));
-    const uint32_t likely_death = like && (like->flags / 2 & 1u) == dies ? like->death : last;
-    if (bit(learned_.same_death[dies], source && source->death == likely_death))
-        t.death = uint8_t(likely_death);
+    if (!dies && bit(learned_.at_border[1], source && source->death == last))
+        t.death = uint8_t(last);
     else
-        t.death = uint8_t(tree(learned_.death, 7, source ? source->death : 0));
+        t.death = uint8_t(t.birth + tree(learned_.length, 7, source ? uint32_t(source->death - t.birth) : 0));
     if (t.birth > t.death || t.death > last) {
         reason = "a track lives outside its window";
         return false;
     }
     const uint32_t length = t.death - t.birth + 1u;
-    if (length > 2 && bit(learned_.flag[2][set + (like ? 1 + (like->flags & track_cosine ? 1 : 0) : 0)],
-                          (wanted & track_cosine) != 0))
+    if (length > 2 && bit(learned_.cosine[like && like->flags & track_cosine][at_most(length, 15)], (wanted & track_cosine) != 0))
         t.flags |= track_cosine;
-    if (!drops_ && bit(learned_.flag[3][0], (wanted & track_fine) != 0)) t.flags |= track_fine;
+    if (!drops_ && bit(learned_.fine, (wanted & track_fine) != 0)) t.flags |= track_fine;
     return true;
 }
 
@@ -277,144 +274,6 @@ void ChunkModel<Coder>::along_axis(RawTrack& t, const Frame& frame, const Near& 
                                : 0;
 }
 
-/// The time coefficients of one channel group, term by term, predicted from like-lived neighbours.
-template <class Coder>
-bool ChunkModel<Coder>::series(RawTrack& t, const Frame& frame, bool second, const Near& near,
-                               const Near& like, const RawTrack* source) {
-    const uint32_t channels = drops_ && second ? 6 : 3, start = drops_ && second ? 0 : 1;
-    const uint32_t group = drops_ * 2u + second;
-    const uint32_t limit = most_terms(t.death - t.birth + 1u, (t.flags & track_cosine) != 0);
-    const uint32_t wanted_terms = source ? (second ? source->second_terms : source->position_terms) : 0;
-    uint32_t terms = start, like_terms = 0;
-    for (uint32_t j = 0; j < like.count; ++j) {
-        const Track& other = block_.tracks[recent_.track[like.slot[j]]];
-        like_terms += second ? other.second_terms : other.position_terms;
-    }
-    if (like.count) like_terms = (2 * like_terms + like.count) / (2 * like.count);
-    int32_t none[6] = {}, previous[6] = {}, before[6] = {};
-    for (uint32_t k = start; k < limit; ++k) {
-        uint32_t activity = 0, older = 0;
-        for (uint32_t c = 0; c < channels; ++c)
-            activity += magnitude(previous[c]), older += magnitude(before[c]);
-        const uint32_t place = at_most(k, 11);
-        const uint32_t expected = like.count ? 1 + at_most(like_terms > k ? like_terms - k : 0, 4) : 0;
-        const uint32_t now = at_most(magnitude_class(activity), 5), past = at_most(magnitude_class(older), 4);
-        const uint32_t positions = second ? at_most(t.position_terms > k ? t.position_terms - k : 0, 4) : 5;
-        if (!bit(learned_.more_mixer[group], &learned_.more[group][0][place * 6 + expected],
-                 &learned_.more[group][1][now * 5 + past], &learned_.more[group][2][now * 6 + expected],
-                 &learned_.more[group][3][positions * 12 + place], wanted_terms > k))
-            break;
-        terms = k + 1;
-        int32_t* out = second ? t.second[k] : t.position[k];
-        const int32_t* wanted = source ? (second ? source->second[k] : source->position[k]) : none;
-        if (!term(t, frame, second, k > 1 ? like : near, k, previous, before, wanted, out)) return false;
-    }
-    (second ? t.second_terms : t.position_terms) = uint8_t(terms < 1 ? 1 : terms);
-    return true;
-}
-
-/// Coefficients k of another track in this one's frame and scale, in 1/256; false: it has none. Lives may differ for
-/// k = 1, the straight part: there the coefficient of a velocity grows as √(n² − 1) with the number of samples n.
-template <class Coder>
-bool ChunkModel<Coder>::turned_term(const RawTrack& t, const Frame& frame, bool second, uint32_t other,
-                                    uint32_t k, int64_t (&out)[3]) const {
-    const Track& from = block_.tracks[other];
-    if (k >= (second ? from.second_terms : from.position_terms) || ((from.flags ^ t.flags) & track_cosine))
-        return false;
-    const float* at =
-        block_.coefficients + from.first_coefficient + (second ? 3 * from.position_terms : 0) + 3 * k;
-    const int64_t v[3] = {load(at), load(at + 1), load(at + 2)};
-    const int64_t life = t.death - t.birth + 1, other_life = from.death - from.birth + 1;
-    const int64_t longer =
-        life == other_life ? 256 : square_root((life * life - 1) * 65536 / (other_life * other_life - 1));
-    for (int c = 0; c < 3; ++c) {
-        int64_t turned = (v[0] * frame.row[c][0] + v[1] * frame.row[c][1] + v[2] * frame.row[c][2]) >> 14;
-        if (c < 2 && !second && !drops_ && !(t.flags & track_fine)) turned = turned * coarse_scale_ >> 16;
-        out[c] = turned * longer >> 8;
-    }
-    return true;
-}
-
-/// Sixteen levels of an expected magnitude in 1/16, finer than magnitude_class().
-inline uint32_t residual_level(uint32_t expected) {
-    constexpr uint32_t above[15] = {0, 2, 4, 7, 10, 14, 20, 28, 40, 56, 80, 120, 190, 320, 640};
-    uint32_t level = 0;
-    while (level < 15 && expected > above[level]) ++level;
-    return level;
-}
-
-template <class Coder>
-bool ChunkModel<Coder>::term(const RawTrack& t, const Frame& frame, bool second, const Near& like, uint32_t k,
-                             int32_t (&previous)[6], int32_t (&before)[6], const int32_t* wanted,
-                             int32_t* out) {
-    const uint32_t channels = drops_ && second ? 6 : 3;
-    int64_t turned[nearest][3] = {};
-    if (channels == 3)
-        for (uint32_t j = 0; j < like.count; ++j)
-            turned_term(t, frame, second, recent_.track[like.slot[j]], k, turned[j]);
-    uint32_t others = 0;
-    int32_t residual[6] = {};
-    for (uint32_t i = 0; i < channels; ++i) {
-        const uint32_t c = channels == 3 ? (i + 2) % 3 : i;  // along the normal first
-        const Kind kind = drops_   ? (second ? drop_shape : drop_path)
-                          : second ? (c == 2 ? turn_axis : turn)
-                                   : (c == 2 ? normal : tangent);
-        int64_t sum = 0, least = 0, most = 0;  // 1/256
-        if (channels == 3)
-            for (uint32_t j = 0; j < like.count; ++j) {
-                sum += turned[j][c];
-                least = j == 0 || turned[j][c] < least ? turned[j][c] : least;
-                most = j == 0 || turned[j][c] > most ? turned[j][c] : most;
-            }
-        constexpr int32_t share[nearest + 1] = {0, 65536, 32768, 21845};
-        const int64_t mean = sum * share[like.count] >> 16;
-        Statistics::Trust& trust = learned_.trust[kind][at_most(k, 5)];
-        const int32_t guess = int32_t((mean * trust.factor + 32768) >> 16);
-        const uint32_t size =
-            at_most(magnitude_class(at_most(uint32_t((mean < 0 ? -mean : mean) / 64), 1u << 20)), 7);
-        const uint32_t spread =
-            like.count == 0 ? 0
-            : like.count == 1
-                ? 1 + at_most(size / 3, 1)
-                : 3 + at_most(magnitude_class(at_most(uint32_t((most - least) / 64), 1u << 20)), 7);
-        // How large a residual to expect: as the neighbours' of this term, as this track's before, as this term's.
-        uint32_t expected = 0, level = !like.count ? 32 : k > 2 ? 16 : 0;
-        if (channels == 3 && k < rest_terms)
-            for (uint32_t j = 0; j < like.count; ++j) expected += recent_.rest[like.slot[j]][second][k][c];
-        expected = expected * 16 * uint32_t(share[like.count]) >> 16;
-        const uint32_t own = 10 * magnitude(previous[c]) + 4 * magnitude(before[c]) + 6 * others;
-        expected += like.count ? own / 2 : own;
-        level += residual_level(expected);
-        const Contexts context = {
-            level,
-            at_most(magnitude_class(magnitude(previous[c]) * 2 + magnitude(before[c])), 6) * 7 +
-                at_most(magnitude_class(others), 6),
-            spread * 3 + at_most(k / 2, 2),
-            size * 6 + at_most(magnitude_class(magnitude(previous[c]) + others), 5)};
-        const int32_t value = signed_value(kind, context, wanted[c] - guess);
-        residual[c] = value;
-        if (channels == 3 && k < rest_terms) rest_[second][k][c] = uint8_t(at_most(magnitude(value), 255));
-        out[c] = value + guess;
-        if (magnitude(out[c]) > uint32_t(max_symbol)) {
-            reason = "a coefficient is out of range";
-            return false;
-        }
-        others += magnitude(value);
-        if (mean) {
-            const int64_t seen = out[c] < -32768 ? -32768 : out[c] > 32768 ? 32768 : out[c];
-            const int64_t said = mean < -(1 << 23) ? -(1 << 23) : mean > 1 << 23 ? 1 << 23 : mean;
-            trust.product += (seen * said * 256 - trust.product) / 32;
-            trust.square += (said * said - trust.square) / 32;
-            if (trust.seen++ % 8 == 0) {
-                const int64_t factor = trust.product * 256 / (trust.square + 1);
-                trust.factor = int32_t(factor < 0 ? 0 : factor > 256 ? 256 : factor);
-            }
-        }
-    }
-    for (uint32_t c = 0; c < channels; ++c) before[c] = previous[c], previous[c] = residual[c];
-    return true;
-}
-
 template <class Coder>
 bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* source) {
     RawTrack t;
@@ -426,7 +285,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         t.position[0][c] = t.second[0][c] = t.second[0][c + 3] = 0;
     }
     measure(x);
-    const Near near = find_near(false, 0);
+    const Near near = find_near([](uint32_t) { return true; });
     if (!life(t, near, source)) return false;
     Frame frame = identity_frame;
     t.axis[0] = t.axis[1] = 0;
@@ -443,11 +302,11 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         along_axis(t, frame, near, source);
     }
     std::memset(rest_, 0, sizeof rest_);
-    const Near like = find_near(true, life_key(t.birth, t.death, t.flags));
+    const Near moving = find_near([&](uint32_t slot) { return recent_.moves[slot]; });
     if (!drops_) coder_.category(bits_motion);
-    if (!series(t, frame, false, near, like, source)) return false;
+    if (!series(t, frame, false, moving, source)) return false;
     if (!drops_) coder_.category(bits_normals);
-    if (!series(t, frame, true, near, like, source)) return false;
+    if (!series(t, frame, true, moving, source)) return false;
     const uint32_t size = coefficients_of(t, drops_);
     if (size > block_.coefficient_count - used_) {
         reason = "more coefficients than the directory says";

@@ -42,11 +42,11 @@ bool read_box(ChunkModel<Coder>& model, const LatticeSteps& steps, int32_t (&low
 }
 
 /// All after the head. `coder`: a RangeDecoder, or what behaves as one. Null, or why the bytes are no chunk of this
-/// shape. What is in the block is still on the lattice: finish_block() follows.
+/// shape. What is in the block is still on the lattice: finish_block() follows. `learned`: a copy of
+/// first_statistics.
 template <class Coder>
-const char* walk_chunk(Coder& coder, const LatticeSteps& steps, const ChunkShape& shape, TrackBlock& block) {
+const char* walk_chunk(Coder& coder, const LatticeSteps& steps, const ChunkShape& shape, TrackBlock& block, Statistics& learned) {
     if (shape.sample_count < 1 || shape.sample_count > max_window_samples) return "the window is too long";
-    Statistics learned;
     ChunkModel<Coder> model(coder, steps, shape.sample_count, learned, block);
     const auto none = [](uint32_t) -> const RawTrack* { return nullptr; };
     const uint32_t counts[2] = {shape.point_count, shape.drop_count};
