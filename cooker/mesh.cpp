@@ -21,6 +21,16 @@ std::vector<glm::vec3> vertex_normals(const Mesh& mesh) {
     return normals;
 }
 
+std::vector<float> vertex_areas(const Mesh& mesh) {
+    std::vector<float> area(mesh.positions.size(), 0.f);
+    for (const Triangle& t : mesh.triangles) {
+        const glm::vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+        const float third = glm::length(glm::cross(b - a, c - a)) / 6;
+        for (uint32_t v : t) area[v] += third;
+    }
+    return area;
+}
+
 float median_edge(const Mesh& mesh) {
     constexpr size_t most = 100000;
     const size_t edges = mesh.triangles.size() * 3;

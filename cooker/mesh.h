@@ -30,6 +30,8 @@ struct UsageError : std::runtime_error {
 
 /// Area-weighted vertex normals (unit; zero where no triangle gives one).
 std::vector<glm::vec3> vertex_normals(const Mesh& mesh);
+/// Per vertex a third of the area of its triangles, m².
+std::vector<float> vertex_areas(const Mesh& mesh);
 /// Median edge length over (at most 100k evenly strided) edges; 0 for an empty mesh.
 float median_edge(const Mesh& mesh);
 /// Signed volume, m³, positive for outward winding.

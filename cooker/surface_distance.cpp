@@ -113,7 +113,28 @@ double DistanceHistogram::quantile(double q) const {
     return 0;
 }
 
-Topology topology(const Mesh& mesh) {
+double DistanceHistogram::share_below(double distance) const {
+    double total = 0, below = 0;
+    for (size_t i = 0; i < area.size(); ++i) total += area[i], below += double(distance_of(i)) < distance ? area[i] : 0;
+    return total > 0 ? below / total : 1;
+}
+
+void Spread::add(float value, double area) {
+    histogram.add(value, area);
+    weight += area, sum += area * value, max = std::max(max, double(value));
+}
+void Spread::add(const SurfaceDistance& distance) {
+    double area = 0;
+    for (double a : distance.histogram.area) area += a;
+    histogram.add(distance.histogram);
+    weight += area, sum += area * distance.mean, max = std::max(max, distance.max);
+}
+void Spread::add(const Spread& other) {
+    histogram.add(other.histogram);
+    weight += other.weight, sum += other.sum, max = std::max(max, other.max);
+}
+
+Topology topology(const Mesh& mesh, double cell) {
     Topology result;
     result.volume = signed_volume(mesh);
     std::vector<std::pair<uint64_t, bool>> edges;  // (lower, higher vertex), whether walked upwards
@@ -131,7 +152,9 @@ Topology topology(const Mesh& mesh) {
         else if (next - i > 2 || edges[i].second == edges[i + 1].second)
             ++result.non_manifold_edges;
     }
-    result.components = uint32_t(component_volumes(mesh).size());
+    const std::vector<double> volumes = component_volumes(mesh);
+    result.components = uint32_t(volumes.size());
+    for (double volume : volumes) result.large_components += std::abs(volume) > large_cells * cell * cell * cell;
     return result;
 }
 
@@ -167,14 +190,17 @@ SurfaceDistance surface_distance(const Mesh& source, const SurfaceIndex& source_
             const glm::vec3 a = there.positions[t[0]];
             result.histogram.add(infinity, 0.5 * glm::length(glm::cross(there.positions[t[1]] - a, there.positions[t[2]] - a)));
         }
-        if (keep_per_vertex) result.per_source_vertex.assign(source.positions.size(), infinity);
+        if (keep_per_vertex) {
+            result.per_source_vertex.assign(source.positions.size(), infinity);
+            result.per_decoded_vertex.assign(decoded.positions.size(), infinity);
+        }
         return result;
     }
     const std::vector<glm::vec3> source_normals = source.normals.empty() ? vertex_normals(source) : source.normals;
     const std::vector<glm::vec3> decoded_normals = decoded.normals.empty() ? vertex_normals(decoded) : decoded.normals;
     Sums forward = measure(source, source_normals, decoded_index, decoded_normals,
                            keep_per_vertex ? &result.per_source_vertex : nullptr);
-    Sums backward = measure(decoded, decoded_normals, source_index, source_normals, nullptr);
+    Sums backward = measure(decoded, decoded_normals, source_index, source_normals, keep_per_vertex ? &result.per_decoded_vertex : nullptr);
     result.forward = forward.result(), result.backward = backward.result();
     forward.add(backward);
     for (const Sample& sample : forward.samples) result.histogram.add(sample.distance, sample.weight);

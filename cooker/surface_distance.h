@@ -29,9 +29,12 @@ private:
 
 struct Topology {
     uint32_t open_edges = 0, non_manifold_edges = 0, components = 0;
+    uint32_t large_components = 0;  ///< of more than large_cells cells
     double volume = 0;  ///< m³
 };
-Topology topology(const Mesh& mesh);
+inline constexpr double large_cells = 8;
+/// `cell`: side of the cubes that tell which components are large, metres; 0: all that have volume.
+Topology topology(const Mesh& mesh, double cell = 0);
 /// Volumes of the connected components, largest first.
 std::vector<double> component_volumes(const Mesh& mesh);
 
@@ -47,13 +50,28 @@ struct DistanceHistogram {
     void add(const DistanceHistogram& other);
     /// The distance that the share `q` of the area keeps below, within 1 %; 0 when empty.
     double quantile(double q) const;
+    double share_below(double distance) const;  ///< of the area, within a bin; 1 when empty
     static float distance_of(size_t bin);  ///< lower end of a bin, metres
 };
 struct SurfaceDistance {
     DirectedDistance forward, backward;  ///< source → decoded, decoded → source
     double mean = 0, p99 = 0, max = 0, normal_degrees = 0;  ///< symmetric: both sample sets pooled
     DistanceHistogram histogram;         ///< both sample sets
-    std::vector<float> per_source_vertex;  ///< unsigned distance, only if asked for
+    std::vector<float> per_source_vertex, per_decoded_vertex;  ///< unsigned distance, only if asked for
+};
+/// Figures over some area, of any number of frames: they are added up, not kept.
+struct Spread {
+    DistanceHistogram histogram;
+    double weight = 0, sum = 0, max = 0;
+    void add(float value, double area);
+    void add(const SurfaceDistance& distance);
+    void add(const Spread& other);
+    double mean() const { return weight > 0 ? sum / weight : 0; }
+    double p99() const { return histogram.area.empty() ? p99_ : histogram.quantile(0.99); }
+    void forget() { p99_ = p99(), histogram = {}; }  ///< keeps the figures; nothing more may be added
+
+private:
+    double p99_ = 0;
 };
 /// Samples: every vertex and every triangle centroid of each side, weighted by the area it stands for.
 /// Both empty: all zero. One empty: distances are +inf.

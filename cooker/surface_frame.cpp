@@ -18,16 +18,6 @@ struct Cloud {
 };
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud, 3, uint32_t>;
 
-std::vector<float> vertex_areas(const Mesh& mesh) {
-    std::vector<float> area(mesh.positions.size(), 0.f);
-    for (const Triangle& t : mesh.triangles) {
-        const glm::vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-        const float third = glm::length(glm::cross(b - a, c - a)) / 6;
-        for (uint32_t v : t) area[v] += third;
-    }
-    return area;
-}
-
 /// Cubes of `size`, in the order of their coordinates.
 void group_vertices(SurfaceFrame& frame, float size) {
     const auto& p = frame.mesh.positions;

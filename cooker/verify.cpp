@@ -8,18 +8,59 @@
 
 #include "asset_directory.h"
 #include "asset_player.h"
+#include "check_velocity.h"
 #include "parallel.h"
 
 namespace rill::cooker {
 namespace {
 
-FrameMeasure measure(const Mesh& source, const Mesh& decoded) {
+FrameMeasure measure(const Mesh& source, const Mesh& decoded, double cell) {
     FrameMeasure frame;
     frame.source_triangles = uint32_t(source.triangles.size()), frame.source_vertices = uint32_t(source.positions.size());
     frame.decoded_triangles = uint32_t(decoded.triangles.size());
     frame.edge = median_edge(source);
+    frame.source = topology(source, cell), frame.decoded = topology(decoded, cell);
+    return frame;
+}
+
+/// Where the source's velocities stand, and what makes them metres per second.
+struct SourceVelocity {
+    bool known = false;
+    double factor = 1;
+};
+SourceVelocity velocity_of(const SequenceReader& source) {
+    if (source.info().velocity == VelocityMeaning::none) return {};
+    return {true, check_velocity(source, [](const std::string&) {}).factor};
+}
+
+double area_of(const Mesh& mesh) {
+    double area = 0;
+    for (float a : vertex_areas(mesh)) area += a;
+    return area;
+}
+
+FrameMeasure measure_plainly(const Mesh& source, AssetPlayer& player, double seconds, double cell) {
+    const Mesh decoded = player.mesh(seconds);
+    FrameMeasure frame = measure(source, decoded, cell);
     frame.distance = surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded));
-    frame.source = topology(source), frame.decoded = topology(decoded);
+    return frame;
+}
+
+FrameMeasure measure_closely(const Mesh& source, const SourceVelocity& velocity, AssetPlayer& player, double seconds, double cell) {
+    Stats stats;
+    const Mesh decoded = player.mesh(seconds, 0, 0, &stats);
+    FrameMeasure frame = measure(source, decoded, cell);
+    const SurfaceIndex source_index(source), decoded_index(decoded);
+    frame.distance = surface_distance(source, source_index, decoded, decoded_index, true);
+    frame.points = stats.points_used;
+    if (stats.points_used > 0) frame.spacing = std::sqrt(area_of(decoded) / stats.points_used);
+    frame.thin = thin_error(source, source_index, frame.distance.per_source_vertex, float(frame.spacing));
+    if (velocity.known) frame.velocity = velocity_error(source, velocity.factor, decoded, decoded_index);
+    frame.distance.per_source_vertex = {}, frame.distance.per_decoded_vertex = {};
+    for (size_t i = 0; i < frame.coarse.size(); ++i) {
+        const Topology shape = topology(player.mesh(seconds, float(cell) * float(coarser[i])));
+        frame.coarse[i] = {coarser[i], shape.open_edges, shape.non_manifold_edges, shape.components};
+    }
     return frame;
 }
 
@@ -34,13 +75,19 @@ void read_target(Verification& result, const std::string& settings_json) {
     if (const nlohmann::json metres = find("target", "p99_metres"); metres.is_number()) result.target_p99 = metres.get<double>();
 }
 
-void sum_up(Verification& result) {
-    for (size_t i = 0; i < result.frames.size(); ++i) {
-        result.totals.add(result.frames[i]);
-        if (result.frames[i].distance.p99 > result.frames[result.worst].distance.p99) result.worst = i;
+/// Takes in the next frame.
+void take(Verification& result, size_t index, FrameMeasure&& frame) {
+    result.totals.add(frame);
+    result.velocity.add(frame.velocity), result.thin.add(frame.thin);
+    for (size_t i = 0; i < frame.coarse.size(); ++i) {
+        CoarseMeasure& all = result.coarse[i];
+        all.times = coarser[i];
+        all.open_edges += frame.coarse[i].open_edges, all.non_manifold_edges += frame.coarse[i].non_manifold_edges;
+        all.components += frame.coarse[i].components;
     }
-    result.mean = result.totals.mean(), result.p99 = result.totals.p99(), result.max = result.totals.max;
-    result.normal_degrees = result.totals.normal_degrees();
+    result.frames.push_back(std::move(frame));
+    result.frames.back().forget_histograms();
+    if (result.frames.back().distance.p99 > result.frames[result.worst].distance.p99) result.worst = index;
 }
 
 /// JSON knows no infinity.
@@ -52,6 +99,12 @@ double number(const nlohmann::json& json) { return json.is_null() ? std::numeric
 double FrameMeasure::volume_ratio() const {
     if (source.volume == 0) return decoded.volume == 0 ? 1 : std::numeric_limits<double>::infinity();
     return decoded.volume / source.volume;
+}
+
+void FrameMeasure::forget_histograms() {
+    distance.histogram = {};
+    velocity.degrees.forget(), velocity.length.forget();
+    for (Spread& spread : thin.below) spread.forget();
 }
 
 std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read) {
@@ -70,11 +123,15 @@ std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const s
     if (read.handedness == 0) read.handedness = setting("handedness") == "left" ? 'l' : 'r';
     if (const nlohmann::json scale = setting("scale"); read.scale == 0 && scale.is_number()) read.scale = scale;
     if (const nlohmann::json fps = setting("fps"); read.frames_per_second == 0 && fps.is_number()) read.frames_per_second = fps;
+    if (const nlohmann::json name = setting("velocity"); read.velocity_name.empty() && name.is_string() && name != "estimate") {
+        read.velocity_name = name;
+        read.velocity_per_frame = setting("velocity_unit") == "frame";
+    }
     return open_sequence(input, read);
 }
 
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
-                    const std::function<void(uint32_t, uint32_t)>& progress) {
+                    const std::function<void(uint32_t, uint32_t)>& progress, bool details) {
     const AssetDirectory directory = read_directory(asset);
     const std::vector<int>& numbers = source.info().numbers;
     std::vector<uint32_t> index;
@@ -84,24 +141,29 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     result.diagonal = directory.diagonal();
     result.edge = directory.header.cell_size;
     result.bytes_per_frame = double(directory.header.file_bytes) / directory.header.frame_count;
+    result.details = details;
     read_target(result, directory.settings_json);
-    result.frames.resize(numbers.size());
-    // One player and one run of neighbouring frames per thread: each window is decoded about once.
-    size_t threads = jobs > 0 ? size_t(jobs) : std::max(1u, std::thread::hardware_concurrency());
-    threads = std::min(threads, numbers.size());
+    const SourceVelocity velocity = details ? velocity_of(source) : SourceVelocity{};
+    // A run of neighbouring frames per task, one player each: its windows are decoded about once.
+    const size_t run = run_length(numbers.size(), jobs);
     std::mutex mutex;
+    size_t next = 0;
     uint32_t done = 0;
-    parallel_for(threads, int(threads), [&](size_t part) {
+    InOrder<FrameMeasure> frames([&](FrameMeasure&& frame) { take(result, next++, std::move(frame)); });
+    parallel_for((numbers.size() + run - 1) / run, jobs, [&](size_t part) {
         AssetPlayer player(asset);
-        for (size_t i = numbers.size() * part / threads; i < numbers.size() * (part + 1) / threads; ++i) {
+        for (size_t i = part * run; i < std::min((part + 1) * run, numbers.size()); ++i) {
             const double seconds = player.frame_seconds(index[i]);
-            FrameMeasure& frame = result.frames[i] = measure(source.read_surface(i), player.mesh(seconds));
+            FrameMeasure frame = details ? measure_closely(velocity.known ? source.read(i) : source.read_surface(i), velocity, player, seconds, result.edge)
+                                         : measure_plainly(source.read_surface(i), player, seconds, result.edge);
             frame.number = numbers[i], frame.seconds = seconds;
             const std::lock_guard lock(mutex);
+            frames.put(i, std::move(frame));
             if (progress) progress(++done, uint32_t(numbers.size()));
         }
     });
-    sum_up(result);
+    result.mean = result.totals.mean(), result.p99 = result.totals.p99(), result.max = result.totals.max;
+    result.normal_degrees = result.totals.normal_degrees();
     return result;
 }
 
@@ -161,46 +223,6 @@ nlohmann::json summary_json(const ErrorTotals& t, double diagonal) {
             {"volume_ratio_min", t.volume_ratio_min},
             {"volume_ratio_max", t.volume_ratio_max},
             {"worst_frame", t.worst_frame}};
-}
-
-nlohmann::json to_json(const Verification& v) {
-    using nlohmann::json;
-    auto topology_json = [](const Topology& t) {
-        return json{{"components", t.components}, {"non_manifold_edges", t.non_manifold_edges}, {"open_edges", t.open_edges},
-                    {"volume_m3", t.volume}};
-    };
-    auto direction = [](const DirectedDistance& d) {
-        return json{{"max_m", d.max}, {"mean_m", d.mean}, {"normal_degrees", d.normal_degrees}, {"p99_m", d.p99}};
-    };
-    json frames = json::array();
-    for (const FrameMeasure& f : v.frames) {
-        frames.push_back({{"frame", f.number},
-                          {"seconds", f.seconds},
-                          {"mean_m", f.distance.mean},
-                          {"p99_m", f.distance.p99},
-                          {"max_m", f.distance.max},
-                          {"normal_degrees", f.distance.normal_degrees},
-                          {"source_to_decoded", direction(f.distance.forward)},
-                          {"decoded_to_source", direction(f.distance.backward)},
-                          {"median_edge_m", f.edge},
-                          {"volume_ratio", f.volume_ratio()},
-                          {"source_triangles", f.source_triangles},
-                          {"decoded_triangles", f.decoded_triangles},
-                          {"source", topology_json(f.source)},
-                          {"decoded", topology_json(f.decoded)}});
-    }
-    json target = nullptr;
-    if (v.target_p99 > 0) target = {{"error", v.target}, {"p99_m", v.target_p99}, {"met", v.target_met()}};
-    return {{"report", "rill verify"},
-            {"version", 1},
-            {"asset", v.asset},
-            {"input", v.input},
-            {"diagonal_m", v.diagonal},
-            {"median_edge_m", v.edge},
-            {"bytes_per_frame", v.bytes_per_frame},
-            {"target", target},
-            {"summary", summary_json(v.totals, v.diagonal)},
-            {"frames", frames}};
 }
 
 }  // namespace rill::cooker

@@ -1,16 +1,26 @@
 // SPDX-License-Identifier: MIT
 // An asset against the sequence it was cooked from, frame by frame, as the runtime shows it.
 #pragma once
+#include <array>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "motion.h"
 #include "readers/reader.h"
 #include "surface_distance.h"
+#include "thin_liquid.h"
+#include "velocity_error.h"
 
 namespace rill::cooker {
+
+/// How the surface fares with cells so many times the source's.
+struct CoarseMeasure {
+    uint32_t times = 1, open_edges = 0, non_manifold_edges = 0, components = 0;
+};
+inline constexpr uint32_t coarser[] = {2, 4};
 
 struct FrameMeasure {
     int number = 0;              ///< the source's
@@ -20,6 +30,14 @@ struct FrameMeasure {
     SurfaceDistance distance;
     Topology source, decoded;
     double volume_ratio() const; ///< decoded / source; 1 when both are empty
+    // Only when details are asked for:
+    uint32_t points = 0;         ///< and drops, decoded
+    double spacing = 0;          ///< of the decoded points: √(decoded area / points), metres
+    VelocityError velocity;      ///< nothing where the source has no velocity
+    ThinError thin;
+    std::array<CoarseMeasure, 2> coarse{};
+    /// What a sequence needs of every frame when its distances are added up: not the histograms.
+    void forget_histograms();
 };
 /// Errors of many frames added up; totals of parts add up to those of the whole.
 struct ErrorTotals {
@@ -44,8 +62,13 @@ nlohmann::json summary_json(const ErrorTotals& totals, double diagonal);
 
 struct Verification {
     std::string asset, input;
-    std::vector<FrameMeasure> frames;
+    std::vector<FrameMeasure> frames;  ///< without histograms
     ErrorTotals totals;
+    bool details = false;        ///< were asked for
+    VelocityError velocity;
+    ThinError thin;
+    std::array<CoarseMeasure, 2> coarse{};  ///< edges of all frames added up
+    Motion motion;               ///< where it was measured; by the caller
     double diagonal = 0;         ///< of the asset's bounds, metres
     double edge = 0;             ///< the source's median edge as the asset states it, metres
     std::string target;          ///< the asset's own --error; empty when it states none
@@ -62,8 +85,9 @@ struct Verification {
 /// cannot be read or the input lacks one.
 std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read);
 /// Every frame of the source against the asset. Throws InputError when the asset lacks one. jobs 0: all cores.
+/// `details`: velocity, thin liquid and coarser cells too.
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
-                    const std::function<void(uint32_t done, uint32_t total)>& progress = {});
+                    const std::function<void(uint32_t done, uint32_t total)>& progress = {}, bool details = false);
 
 /// Documented in cooker/REPORTS.md.
 nlohmann::json to_json(const Verification& verification);

@@ -59,8 +59,7 @@ std::string error_graph(const Verification& v) {
 
 /// Share of the surface by distance, quarter octaves.
 std::string histogram(const Verification& v) {
-    DistanceHistogram all;
-    for (const FrameMeasure& f : v.frames) all.add(f.distance.histogram);
+    const DistanceHistogram& all = v.totals.histogram;
     double total = 0;
     for (double a : all.area) total += a;
     std::vector<std::pair<double, double>> bars;  // distance, share
@@ -119,6 +118,52 @@ std::string worst_frames(const Verification& v, const SequenceReader& source, co
     return html;
 }
 
+std::string details(const Verification& v) {
+    if (!v.details) return "";
+    const double edges = v.edge > 0 ? 1 / v.edge : 0;
+    uint64_t source = 0, decoded = 0;
+    for (const FrameMeasure& f : v.frames) source += f.source.large_components, decoded += f.decoded.large_components;
+    std::string html = "<h2>Shape, thin liquid, velocity</h2><table>\n";
+    html += row("Components larger than " + format("%g cells", large_cells), std::to_string(source) + " in the source, " + std::to_string(decoded) + " decoded");
+    for (const CoarseMeasure& m : v.coarse)
+        html += row("Cells " + std::to_string(m.times) + " times as coarse",
+                    std::to_string(m.open_edges) + " open, " + std::to_string(m.non_manifold_edges) + " non-manifold edges");
+    for (size_t i = 0; i < ThinError::classes; ++i)
+        html += row("Thinner than " + std::to_string(i + 1) + " point spacings",
+                    format("%.2f %% of the surface: ", 100 * v.thin.area_share(i)) + format("mean %.3f, ", v.thin.below[i].mean() * edges) +
+                        format("p99 %.3f, ", v.thin.below[i].p99() * edges) + format("max %.3f source edges", v.thin.below[i].max * edges));
+    if (v.velocity.degrees.weight > 0)
+        html += row("Velocity", format("direction off by %.2f°, ", v.velocity.degrees.mean()) + format("p99 %.1f°; ", v.velocity.degrees.p99()) +
+                                    format("length by %.2f %%, ", 100 * v.velocity.length.mean()) + format("p99 %.1f %%", 100 * v.velocity.length.p99()));
+    return html + "</table>\n";
+}
+
+/// The farthest that anything moves in each substep, one bar each; those that jump are red.
+std::string motion(const Verification& v) {
+    const Motion& m = v.motion;
+    if (m.substeps == 0) return "";
+    const double edges = v.edge > 0 ? 1 / v.edge : 0, limit = m.most_smooth();
+    std::vector<double> all;
+    double most = limit;
+    for (const IntervalMotion& interval : m.intervals)
+        for (const Displacement& d : interval.substeps) {
+            all.push_back(d.max);
+            if (std::isfinite(d.max)) most = std::max(most, d.max);
+        }
+    std::string svg = "<svg viewBox=\"0 0 900 180\" role=\"img\" aria-label=\"largest displacement of each substep\">\n";
+    const double step = 880.0 / double(std::max<size_t>(all.size(), 1));
+    for (size_t i = 0; i < all.size() && most > 0; ++i) {
+        const double height = 170 * std::min(all[i], most) / most;
+        svg += std::string("<rect") + (all[i] > limit ? " class=\"jump\"" : "") + " x=\"" + format("%.1f", 10 + step * double(i)) + "\" y=\"" +
+               format("%.1f", 175 - height) + "\" width=\"" + format("%.2f", step * 0.85) + "\" height=\"" + format("%.1f", height) + "\"/>\n";
+    }
+    svg += "</svg>\n";
+    return "<h2>Motion between frames</h2>\n" + svg + "<p>The farthest that anything moves in each of " + std::to_string(m.substeps) +
+           " substeps a frame, up to " + format("%.3g source edges; ", most * edges) + std::to_string(m.jumps()) +
+           " of them (red) by more than thrice the mean frame step of " + format("%.3g edges. ", m.frame.mean() * edges) + "Window borders: " +
+           format("p99 %.3f, ", m.border.p99() * edges) + format("max %.3f edges.</p>\n", m.border.max * edges);
+}
+
 std::string bytes_by_kind(const nlohmann::json& cook) {
     if (!cook.is_object() || !cook.contains("bytes") || !cook["bytes"].is_object()) return "";
     double total = 0;
@@ -138,7 +183,7 @@ body{font:15px/1.45 system-ui,sans-serif;max-width:1000px;margin:2em auto;paddin
 h1,h2,h3{font-weight:600}table{border-collapse:collapse}th{text-align:left;font-weight:500;padding:.15em 1.5em .15em 0}
 td{font-variant-numeric:tabular-nums;padding-right:1em}svg{width:100%;font:11px sans-serif}polyline{fill:none;stroke-width:1.6}
 .p99{stroke:#c33}.mean{stroke:#27c}.target{stroke:#888;stroke-dasharray:6 4}.grid{stroke:#ddd}rect,.bar{fill:#58a;background:#58a}
-.bar{height:.8em}.key{display:inline-block;width:1.5em;height:3px;margin:0 .4em 3px 1em}.k99{background:#c33}.kmean{background:#27c}
+.jump{fill:#c33}.bar{height:.8em}.key{display:inline-block;width:1.5em;height:3px;margin:0 .4em 3px 1em}.k99{background:#c33}.kmean{background:#27c}
 .ktarget{background:#888}.row{display:flex;gap:8px}figure{margin:0;flex:1}img{width:100%;border:1px solid #ddd}
 figcaption{font-size:12px;color:#555}pre{background:#f5f5f5;padding:1em;overflow:auto}.missed{color:#b00}</style>)";
 
@@ -163,7 +208,7 @@ std::string to_html(const Verification& v, const SequenceReader& source) {
     if (v.target_p99 > 0)
         html += "<p class=\"" + std::string(v.target_met() ? "met" : "missed") + "\">Aimed at p99 " + format("%.3g m", v.target_p99) + " (--error " +
                 escaped(v.target) + "): " + (v.target_met() ? "met" : "missed") + ".</p>\n";
-    html += "<h2>Error over time</h2>\n" + error_graph(v) + "<h2>Surface by distance</h2>\n" + histogram(v);
+    html += "<h2>Error over time</h2>\n" + error_graph(v) + "<h2>Surface by distance</h2>\n" + histogram(v) + details(v) + motion(v);
     html += "<h2>Worst frames</h2>\n" + worst_frames(v, source, directory) + bytes_by_kind(cook);
     if (cook.is_object())
         html += "<h2>Cook</h2><pre>" + escaped(cook.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) + "</pre>\n";

@@ -341,10 +341,12 @@ TEST_CASE("assets that are none: 2, whatever the command") {
 
 TEST_CASE("verify: meets its target, and says so in JSON and HTML") {
     const TestFolder folder;
-    const Result result = run_rill("verify " + clip().asset + " " + clip().input + " --json " + (folder / "v.json") + " --html " + (folder / "v.html"));
+    const Result result = run_rill("verify " + clip().asset + " " + clip().input + " --substeps 2 --json " + (folder / "v.json") + " --html " + (folder / "v.html"));
     CAPTURE(result.text);
     CHECK(result.code == 0);
     CHECK(has(result, "worst frame"));
+    CHECK(has(result, "thinner than 1 point spacing:"));
+    CHECK(has(result, "2 substeps a frame"));
     const nlohmann::json json = json_of(folder / "v.json");
     REQUIRE(json.is_object());
     CHECK(json["frames"].size() == 6);
@@ -352,6 +354,16 @@ TEST_CASE("verify: meets its target, and says so in JSON and HTML") {
     CHECK(json["target"]["met"] == true);
     CHECK(json["summary"]["p99_m"].get<double>() <= 1.1 * json["target"]["p99_m"].get<double>());
     CHECK(json["frames"][2]["source"]["components"] == 1);
+    CHECK(json["frames"][2]["source"]["large_components"] == 1);
+    CHECK(json["frames"][2]["points"].get<int>() > 10);
+    CHECK(json["thin"].size() == 3);
+    CHECK(json["thin"][0]["area_share"] < json["thin"][2]["area_share"]);
+    CHECK(json["coarser"][1]["times"] == 4);
+    CHECK(json["coarser"][1]["open_edges"] == 0);
+    CHECK(json["motion"]["intervals"].size() == 5);
+    CHECK(json["motion"]["intervals"][4]["substeps"].size() == 2);
+    CHECK(json["motion"]["lone_pieces"] == 0);
+    CHECK(json["velocity"]["length_p99"] > 0);
     const std::string page = get_file(folder / "v.html");
     CHECK(page.find("<svg") != std::string::npos);
     CHECK(page.find("data:image/png;base64,") != std::string::npos);
