@@ -361,7 +361,13 @@ TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact veloc
     CHECK(evaluate(2.0, 4, points) == 1);
     CHECK(evaluate(9.75, 4, points) == 3);
     CHECK(*std::min_element(points.activity, points.activity + 3) == doctest::Approx(0.25));
-    CHECK(evaluate(20.5, 4, points) == 3);  // a life of one sample fades on both sides
+    // A life of one sample fades on both sides, and within half a step.
+    for (const double s : {19.75, 20.25}) {
+        CHECK(evaluate(s, 4, points) == 3);
+        CHECK(*std::min_element(points.activity, points.activity + 3) == doctest::Approx(0.5));
+    }
+    CHECK(evaluate(19.5, 4, points) == 2);
+    CHECK(evaluate(20.5, 4, points) == 2);
     evaluate(12.0, 4, points);
     const glm::vec3 x(points.x[0], points.y[0], points.z[0]), v(points.vx[0], points.vy[0], points.vz[0]);
     evaluate(12.05, 4, points);

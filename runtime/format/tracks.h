@@ -12,7 +12,8 @@
 // φ_k the orthonormal Fourier-extension basis of length death − birth + 1 (fourier_extension.h).
 // A track that is born (not carried over the window's border) is also active on (birth − 1, birth),
 // one that dies on (death, death + 1): there it moves along the tangent of its end and its
-// activity ramps linearly between 0 and 1. Elsewhere activity is 1; outside, the track is absent.
+// activity ramps linearly between 0 and 1; over half of it if its life is one sample, which has no tangent. Elsewhere
+// activity is 1; outside, the track is absent.
 #pragma once
 #include <cstdint>
 

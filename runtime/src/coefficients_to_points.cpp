@@ -34,9 +34,12 @@ float* rows_of(const TimeRows* rows, uint32_t birth, uint32_t death, bool cosine
 
 /// 0: absent.
 float activity_at(const format::Track& track, double s) {
-    if (s < track.birth) return track.flags & format::track_born ? float(s - track.birth + 1) : 0.f;
-    if (s > track.death) return track.flags & format::track_dies ? float(track.death + 1 - s) : 0.f;
-    return 1.f;
+    const bool before = s < track.birth, after = s > track.death;
+    if (!before && !after) return 1;
+    if (!(track.flags & (before ? format::track_born : format::track_dies))) return 0;
+    const double away = before ? track.birth - s : s - track.death;
+    // One sample tells no motion: such a track stands where fast liquid only will be, or was, and is seen there as scraps.
+    return float(1 - away * (track.birth == track.death ? 2 : 1));
 }
 
 /// Σ row[k] · coefficient[k][c]: the channels of a track at one moment.
