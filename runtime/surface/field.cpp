@@ -342,7 +342,7 @@ void fit_patch(Field& f, uint32_t i, Surroundings& surroundings) {
     const float beside = std::sqrt(neighbours.any[1]);
     const float spacing = std::min({spacing_of(f, neighbours), most_alone * around, most_apart * beside});
     // A point that fades draws in, or what it alone covers would stay to the last and then be gone at once.
-    const float grown = std::sqrt(f.activity[i]);
+    const float grown = f.activity[i];
     const float support = (spacing > 1e-4f * f.grid_cell ? support_scale * spacing : f.grid_cell) * grown;
     f.support[i] = support;
     // k neighbours within d: on a surface one point in π d² / (k + ½). Far more even than a rule on the 6th; but the
