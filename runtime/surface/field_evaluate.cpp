@@ -62,42 +62,20 @@ private:
     float row_[7][chunk] = {};
 };
 
-/// Positions whose sign the winding number decides: gathered from many batches, asked for together.
-class Doubts {
-public:
-    Doubts(const Field& f, const Results& out) : f_(f), out_(out) {}
-    ~Doubts() { settle(); }
-    void add(const Batch& b, uint32_t l, uint32_t index) {
-        x_[count_] = b.x[l], y_[count_] = b.y[l], z_[count_] = b.z[l];
-        far_[count_] = b.u2[l] > core, index_[count_++] = index;
-        if (count_ == lanes) settle();
-    }
-
-private:
-    void settle() {
-        if (count_ == 0) return;
-        for (uint32_t l = count_; l < lanes; ++l) x_[l] = x_[0], y_[l] = y_[0], z_[l] = z_[0];
-        alignas(64) float winding[lanes], distance2[lanes];
-        f_.kernels->winding(f_, x_, y_, z_, winding, distance2);
-        for (uint32_t l = 0; l < count_; ++l) overrule(index_[l], winding[l], std::sqrt(distance2[l]), far_[l]);
-        count_ = 0;
-    }
-    void overrule(uint32_t i, float winding, float distance, bool far) {
-        // Between wide patches the discs are too coarse to ask: then the blend stands, if there is one.
-        const float doubt = far ? likely : sure;
-        const bool certain = winding < doubt || winding > 1 - doubt, inside = winding > 0.5f;
-        const bool unknown = out_.value[i] >= unsupported;
-        if (!unknown && !(certain && (far || inside != (out_.value[i] < 0)))) return;
-        out_.value[i] = inside ? -std::min(distance, f_.grid_cell) : distance < f_.largest_support ? distance : unsupported;
-        for (float* row : {out_.gx, out_.gy, out_.gz, out_.vx, out_.vy, out_.vz})
-            if (row) row[i] = 0;
-    }
-    const Field& f_;
-    const Results& out_;
-    alignas(64) float x_[lanes], y_[lanes], z_[lanes];
-    uint32_t index_[lanes], count_ = 0;
-    bool far_[lanes];
-};
+/// Where the blend alone does not decide: asks the winding number, and overrules where that is sure.
+void settle(const Field& f, const Batch& b, uint32_t l, uint32_t i, const Results& out) {
+    float distance2;
+    const float winding = f.kernels->winding(f, b.x[l], b.y[l], b.z[l], distance2);
+    // Between wide patches the discs are too coarse to ask: then the blend stands, if there is one.
+    const bool far = b.u2[l] > core;
+    const float doubt = far ? likely : sure, distance = std::sqrt(distance2);
+    const bool certain = winding < doubt || winding > 1 - doubt, inside = winding > 0.5f;
+    const bool unknown = out.value[i] >= unsupported;
+    if (!unknown && !(certain && (far || inside != (out.value[i] < 0)))) return;
+    out.value[i] = inside ? -std::min(distance, f.spacing) : distance < f.largest_support ? distance : unsupported;
+    for (float* row : {out.gx, out.gy, out.gz, out.vx, out.vy, out.vz})
+        if (row) row[i] = 0;
+}
 
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const float* x, const float* y,
                const float* z, uint32_t n, const Results& out) {
@@ -142,7 +120,6 @@ struct Evaluation {
     const Field& f;
     const Results& out;
     Shortlist& shortlist;
-    Doubts& doubts;
     float trusted_value;  ///< up to this, values are not doubted
     uint32_t list[most_listed];
     Batch batch;
@@ -167,7 +144,7 @@ struct Evaluation {
         int32_t any = 0;
         for (uint32_t l = 0; l < lanes; ++l) any |= batch.doubt[l] &= std::fabs(batch.value[l]) > trusted_value;
         for (uint32_t l = 0; any && f.point_count && l < n; ++l)
-            if (batch.doubt[l]) doubts.add(batch, l, first + l);
+            if (batch.doubt[l]) settle(f, batch, l, first + l, out);
     }
     void write_slopes(uint32_t count, uint32_t n, uint32_t first) {
         Slopes sum;
@@ -186,8 +163,7 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
     const uint32_t points = uint32_t(std::lower_bound(candidates, candidates + count, f.point_count) - candidates);
     {
         Shortlist shortlist(f, candidates, points);
-        Doubts doubts(f, out);
-        Evaluation evaluation{f, out, shortlist, doubts, trusted_value, {}, {}};
+        Evaluation evaluation{f, out, shortlist, trusted_value, {}, {}};
         for (uint32_t first = 0; first < n; first += lanes)
             evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
     }
@@ -197,30 +173,7 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
 }  // namespace
 
 uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity) noexcept {
-    uint32_t found = 0;
-    const auto take = [&](uint32_t i) {
-        if (found < capacity) out[found] = i;
-        ++found;
-    };
-    int from[3], to[3];
-    for (int a = 0; a < 3; ++a) {
-        const float size = float(f.grid_size[a]);
-        from[a] = int(std::clamp((box.lower[a] - f.largest_support - f.grid_origin[a]) / f.grid_cell - 0.01f, 0.f, size));
-        to[a] = int(std::clamp((box.upper[a] + f.largest_support - f.grid_origin[a]) / f.grid_cell + 0.01f, -1.f, size - 1));
-    }
-    uint32_t within[chunk / lanes];
-    for (int z = from[2]; f.point_count && z <= to[2]; ++z)
-        for (int y = from[1]; y <= to[1]; ++y) {
-            const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
-            if (from[0] > to[0]) continue;
-            const uint32_t last = f.cell_start[row + uint32_t(to[0]) + 1];
-            for (uint32_t j = f.cell_start[row + uint32_t(from[0])]; j < last; j += chunk) {
-                const float* const rows[7] = {f.x + j, f.y + j, f.z + j, f.nx + j, f.ny + j, f.nz + j, f.steep + j};
-                const uint32_t n = std::min(chunk, last - j);
-                f.kernels->reach(rows, n, box.lower, box.upper, within);
-                for_bits(within, n, [&](uint32_t c) { take(j + c); });
-            }
-        }
+    uint32_t found = f.kernels->gather(f, box.lower, box.upper, out, capacity);
     for (uint32_t d = 0; d < f.drop_count; ++d) {
         const float p[3] = {f.dx[d], f.dy[d], f.dz[d]};
         float d2 = 0;
@@ -228,7 +181,9 @@ uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity
             const float r = std::max({box.lower[a] - p[a], p[a] - box.upper[a], 0.f});
             d2 += r * r;
         }
-        if (d2 < f.reach[d] * f.reach[d]) take(f.point_count + d);
+        if (!(d2 < f.reach[d] * f.reach[d])) continue;
+        if (found < capacity) out[found] = f.point_count + d;
+        ++found;
     }
     return found;
 }
