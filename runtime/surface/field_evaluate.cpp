@@ -11,17 +11,6 @@
 namespace rill::surface {
 namespace {
 
-constexpr uint32_t most_listed = 1024;  // patches that a batch may blend
-constexpr uint32_t chunk = most_reached;  // candidates looked at together
-
-/// Work(number) for each of the first n bits that is set, 16 to a word.
-template <typename Work>
-void for_bits(const uint32_t* words, uint32_t n, Work&& work) {
-    for (uint32_t first = 0; first < n; first += lanes)
-        rill::for_bits(words[first / lanes] & (n - first < lanes ? (1u << (n - first)) - 1 : ~0u),
-                       [&](uint32_t bit) { work(first + bit); });
-}
-
 /// What results go to; null: not wanted.
 struct Results {
     float *value, *gx, *gy, *gz, *vx, *vy, *vz;
@@ -31,35 +20,35 @@ struct Results {
 class Shortlist {
 public:
     Shortlist(const Field& f, const uint32_t* candidates, uint32_t count) : f_(f), candidates_(candidates), count_(count) {
-        if (count_ <= chunk) lay_out(0);
+        if (count_ <= most_laid_out) lay_out(0);
     }
     /// Up to most_listed of them, ascending; returns how many there are.
-    uint32_t list(const Box& box, uint32_t* out) {
+    uint32_t list(const Batch& batch, uint32_t* out) {
+        const float* rows[7];
+        for (int k = 0; k < 7; ++k) rows[k] = row_[k];
         uint32_t found = 0;
-        for (uint32_t first = 0; first < count_; first += chunk) {
-            if (count_ > chunk) lay_out(first);
-            const float* rows[7];
-            for (int k = 0; k < 7; ++k) rows[k] = row_[k];
-            const uint32_t n = std::min(chunk, count_ - first);
-            uint32_t within[chunk / lanes];
-            f_.kernels->reach(rows, n, box.lower, box.upper, within);
-            for_bits(within, n, [&](uint32_t c) { out[std::min(found++, most_listed - 1)] = candidates_[first + c]; });
+        for (uint32_t first = 0; first < count_; first += most_laid_out) {
+            if (count_ > most_laid_out) lay_out(first);
+            found = f_.kernels->shortlist(rows, candidates_ + first, std::min(most_laid_out, count_ - first), batch, out, found);
         }
         return found;
     }
 
 private:
     void lay_out(uint32_t first) {
-        for (uint32_t c = 0; c < std::min(chunk, count_ - first); ++c) {
+        const uint32_t n = std::min(most_laid_out, count_ - first);
+        for (uint32_t c = 0; c < n; ++c) {
             const Patch& p = f_.patches[candidates_[first + c]];
             const float value[7] = {p.x, p.y, p.z, p.nx, p.ny, p.nz, p.inverse};
             for (int k = 0; k < 7; ++k) row_[k][c] = value[k];
         }
+        for (uint32_t c = n; c < (n + lanes - 1) / lanes * lanes; ++c)
+            for (int k = 0; k < 7; ++k) row_[k][c] = 0;
     }
     const Field& f_;
     const uint32_t* candidates_;
     uint32_t count_;
-    float row_[7][chunk] = {};
+    alignas(64) float row_[7][most_laid_out];
 };
 
 /// Where the blend alone does not decide: asks the winding number, and overrules where that is sure.
@@ -103,17 +92,13 @@ void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const
     }
 }
 
-/// The last position fills unused lanes: no branch in the kernels.
-Box load(Batch& b, const float* x, const float* y, const float* z, uint32_t n) {
-    Box box{{x[0], y[0], z[0]}, {x[0], y[0], z[0]}};
-    for (uint32_t l = 0; l < lanes; ++l) {
-        const uint32_t i = std::min(l, n - 1);
-        b.x[l] = x[i], b.y[l] = y[i], b.z[l] = z[i];
-        box.lower[0] = std::min(box.lower[0], x[i]), box.upper[0] = std::max(box.upper[0], x[i]);
-        box.lower[1] = std::min(box.lower[1], y[i]), box.upper[1] = std::max(box.upper[1], y[i]);
-        box.lower[2] = std::min(box.lower[2], z[i]), box.upper[2] = std::max(box.upper[2], z[i]);
+/// The first position fills unused lanes: no branch in the kernels.
+void load(float* to, const float* from, uint32_t n) {
+    if (n == lanes) {
+        std::copy(from, from + lanes, to);
+        return;
     }
-    return box;
+    std::fill(std::copy(from, from + n, to), to + lanes, from[0]);
 }
 
 struct Evaluation {
@@ -121,40 +106,37 @@ struct Evaluation {
     const Results& out;
     Shortlist& shortlist;
     float trusted_value;  ///< up to this, values are not doubted
-    uint32_t list[most_listed];
     Batch batch;
+    uint32_t list[most_listed];
+
+    Evaluation(const Field& field, const Results& results, Shortlist& of, float trusted)
+        : f(field), out(results), shortlist(of), trusted_value(trusted) {}
 
     /// n ≤ lanes positions; results go to index `first` on.
     void run(const float* x, const float* y, const float* z, uint32_t n, uint32_t first) {
-        const Box box = load(batch, x, y, z, n);
-        uint32_t count = shortlist.list(box, list);
+        load(batch.x, x, n), load(batch.y, y, n), load(batch.z, z, n);
+        uint32_t count = shortlist.list(batch, list);
         if (count > most_listed && n > 1) {
             // A crowd: one by one, so that what each leaves out depends on itself alone.
             for (uint32_t l = 0; l < n; ++l) run(x + l, y + l, z + l, 1, first + l);
             return;
         }
         count = std::min(count, most_listed);
+        uint32_t doubts = ~0u;
         if (count)
-            f.kernels->blend(f, list, count, batch);
+            doubts = f.kernels->blend(f, list, count, trusted_value, batch);
         else
-            for (uint32_t l = 0; l < lanes; ++l)
-                batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0, batch.doubt[l] = 1;
+            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0;
         std::copy(batch.value, batch.value + n, out.value + first);
         if (out.gx) write_slopes(count, n, first);
-        int32_t any = 0;
-        for (uint32_t l = 0; l < lanes; ++l) any |= batch.doubt[l] &= std::fabs(batch.value[l]) > trusted_value;
-        for (uint32_t l = 0; any && f.point_count && l < n; ++l)
-            if (batch.doubt[l]) settle(f, batch, l, first + l, out);
+        if (f.point_count) for_bits(doubts & ((1u << n) - 1), [&](uint32_t l) { settle(f, batch, l, first + l, out); });
     }
     void write_slopes(uint32_t count, uint32_t n, uint32_t first) {
-        Slopes sum;
-        f.kernels->slope(f, list, count, batch, out.vx != nullptr, sum);
-        for (uint32_t l = 0; l < n; ++l) {
-            const uint32_t i = first + l;
-            const float s = batch.weight[l] > 0 ? 1 / batch.weight[l] : 0;
-            out.gx[i] = sum.gx[l] * s, out.gy[i] = sum.gy[l] * s, out.gz[i] = sum.gz[l] * s;
-            if (out.vx) out.vx[i] = sum.vx[l] * s, out.vy[i] = sum.vy[l] * s, out.vz[i] = sum.vz[l] * s;
-        }
+        Slopes mean;
+        f.kernels->slope(f, list, count, batch, out.vx != nullptr, mean);
+        const float* from[6] = {mean.gx, mean.gy, mean.gz, mean.vx, mean.vy, mean.vz};
+        float* const to[6] = {out.gx, out.gy, out.gz, out.vx, out.vy, out.vz};
+        for (int k = 0; k < (out.vx ? 6 : 3); ++k) std::copy(from[k], from[k] + n, to[k] + first);
     }
 };
 
@@ -163,7 +145,7 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
     const uint32_t points = uint32_t(std::lower_bound(candidates, candidates + count, f.point_count) - candidates);
     {
         Shortlist shortlist(f, candidates, points);
-        Evaluation evaluation{f, out, shortlist, trusted_value, {}, {}};
+        Evaluation evaluation(f, out, shortlist, trusted_value);
         for (uint32_t first = 0; first < n; first += lanes)
             evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
     }

@@ -14,12 +14,12 @@ namespace {
                                 uint32_t capacity) {                                                              \
         return inner::gather(f, lower, upper, out, capacity);                                                     \
     }                                                                                                             \
-    target void reach_##id(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],   \
-                           uint32_t* within) {                                                                    \
-        inner::reach(point, n, lower, upper, within);                                                             \
+    target uint32_t shortlist_##id(const float* const row[7], const uint32_t* candidates, uint32_t n, const Batch& b, \
+                                   uint32_t* list, uint32_t found) {                                              \
+        return inner::shortlist(row, candidates, n, b, list, found);                                              \
     }                                                                                                             \
-    target void blend_##id(const Field& f, const uint32_t* list, uint32_t count, Batch& b) {                      \
-        inner::blend(f, list, count, b);                                                                          \
+    target uint32_t blend_##id(const Field& f, uint32_t* list, uint32_t& count, float trusted, Batch& b) {        \
+        return inner::blend(f, list, count, trusted, b);                                                          \
     }                                                                                                             \
     target void slope_##id(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, bool velocity,   \
                            Slopes& out) {                                                                         \
@@ -34,7 +34,7 @@ namespace {
     target void fit_##id(Field& f, uint32_t first, uint32_t last, const Nearest& near) {                          \
         inner::fit(f, first, last, near);                                                                         \
     }                                                                                                             \
-    constexpr Kernels kernels_##id{#id, gather_##id, reach_##id, blend_##id, slope_##id, winding_##id, nearest_##id, fit_##id};
+    constexpr Kernels kernels_##id{#id, gather_##id, shortlist_##id, blend_##id, slope_##id, winding_##id, nearest_##id, fit_##id};
 
 #if defined(__GNUC__) && !defined(__clang__)
 RILL_LEVEL(scalar, __attribute__((optimize("no-tree-vectorize", "no-tree-slp-vectorize"))))

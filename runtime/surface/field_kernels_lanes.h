@@ -29,8 +29,15 @@ RILL_INLINE uint32_t word_of(uint32_t (&bit)[lanes]) {
     return bit[0] | bit[1] | bit[2] | bit[3];
 }
 
-RILL_INLINE float greatest_of(float (&value)[lanes]) {
-    for (uint32_t l = 0; l < 8; ++l) value[l] = greater(value[l], value[l + 8]);
+RILL_INLINE float least_of(const float* of) {
+    alignas(64) float value[lanes / 2];
+    for (uint32_t l = 0; l < 8; ++l) value[l] = lesser(of[l], of[l + 8]);
+    for (uint32_t l = 0; l < 4; ++l) value[l] = lesser(value[l], value[l + 4]);
+    return lesser(lesser(value[0], value[1]), lesser(value[2], value[3]));
+}
+RILL_INLINE float greatest_of(const float* of) {
+    alignas(64) float value[lanes / 2];
+    for (uint32_t l = 0; l < 8; ++l) value[l] = greater(of[l], of[l + 8]);
     for (uint32_t l = 0; l < 4; ++l) value[l] = greater(value[l], value[l + 4]);
     return greater(greater(value[0], value[1]), greater(value[2], value[3]));
 }

@@ -53,9 +53,17 @@ RILL_INLINE uint32_t reaching(const float* const point[7], uint32_t first, const
     }
     return word_of(bit);
 }
-RILL_INLINE void reach(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],
-                       uint32_t* within) {
-    for (uint32_t first = 0; first < n; first += lanes) within[first / lanes] = reaching(point, first, lower, upper);
+/// Appends those of n candidates, laid out in rows, that reach the box of a batch.
+RILL_INLINE uint32_t shortlist(const float* const row[7], const uint32_t* candidates, uint32_t n, const Batch& b,
+                               uint32_t* list, uint32_t found) {
+    const float lower[3] = {least_of(b.x), least_of(b.y), least_of(b.z)};
+    const float upper[3] = {greatest_of(b.x), greatest_of(b.y), greatest_of(b.z)};
+    for (uint32_t first = 0; first < n; first += lanes) {
+        const uint32_t known = n - first < lanes ? (1u << (n - first)) - 1 : ~0u;
+        for (uint32_t some = reaching(row, first, lower, upper) & known; some; some &= some - 1, ++found)
+            list[found < most_listed ? found : most_listed - 1] = candidates[first + lowest_bit(some)];
+    }
+    return found;
 }
 RILL_INLINE uint32_t gather(const Field& f, const float lower[3], const float upper[3], uint32_t* out, uint32_t capacity) {
     const float* const rows[7] = {f.x, f.y, f.z, f.nx, f.ny, f.nz, f.steep};
@@ -101,11 +109,10 @@ struct Winding {
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = cx[l] - x, ry = cy[l] - y, rz = cz[l] - z;
             const float distance2 = rx * rx + ry * ry + rz * rz, d2 = distance2 + 1e-20f;
-            const bool is_near = distance2 < limit[l];
             const float share = (ax[l] * rx + ay[l] * ry + az[l] * rz) * inverse_cube_root_squared(d2);
-            sum[l] += is_near ? 0 : share;
-            nearest[l] = lesser(is_near ? unsupported : d2, nearest[l]);
-            near[l] = is_near ? bit_of_lane[l] : 0u;
+            const float counted = distance2 < limit[l] ? 0.f : share, far2 = distance2 < limit[l] ? unsupported : d2;
+            sum[l] += counted, nearest[l] = lesser(far2, nearest[l]);
+            near[l] = distance2 < limit[l] ? bit_of_lane[l] : 0u;
         }
         return word_of(near);
     }
