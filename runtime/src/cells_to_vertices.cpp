@@ -55,14 +55,21 @@ bool doubled_beyond(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t f
     return patches_of(other).doubled >> (face ^ 1u) & 1;
 }
 
-/// The pattern of a surface cell: a face between cells of one size is turned when it is doubled from both sides.
-CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
+/// Of a cell with turned or doubled faces: a face between cells of one size is turned when it is doubled from both sides.
+CellPattern turned_pattern(const Mesher& m, const Tile& tile, uint32_t cell) {
     const CellPattern plain = plain_pattern(tile, cell);
     const uint32_t doubled = plain.turned() ? patches_of(plain).doubled : cell_patches[plain.signs()].doubled;
     uint32_t turned = plain.turned();
     for (uint32_t face = 0; doubled >> face; ++face)
         if (doubled >> face & 1 && doubled_beyond(m, tile, cell, face)) turned |= 1u << face;
     return pattern_of(plain.signs(), turned);
+}
+
+/// The pattern of a surface cell.
+CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
+    const uint32_t signs = corner_signs(tile, cell);
+    const bool plain = !cell_patches[signs].doubled && !(tile.beside & every_finer);
+    return plain ? pattern_of(signs, 0) : turned_pattern(m, tile, cell);
 }
 
 /// Block by block of 4³: vertices next to each other share what they are evaluated from.
