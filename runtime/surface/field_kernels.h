@@ -31,7 +31,8 @@ struct alignas(64) Slopes {
 /// distances, `beyond` for none.
 struct alignas(64) Nearest {
     float d2[most_neighbours][lanes], any[support_neighbour][lanes];
-    uint32_t id[most_neighbours][lanes], any_id[support_neighbour][lanes];
+    uint32_t id[most_neighbours][lanes];
+    uint32_t any_id[support_neighbour][lanes];  ///< not read: without it compilers insert lane by lane
     float beyond;
 };
 

@@ -40,21 +40,20 @@ struct Search {
     RILL_INLINE void offer(uint32_t j) {
         constexpr uint32_t half = most_neighbours / 2;
         const float px = f.x[j], py = f.y[j], pz = f.z[j], qx = f.nx[j], qy = f.ny[j], qz = f.nz[j], beyond = found.beyond;
-        const float *last = found.d2[most_neighbours - 1], *middle = found.d2[half - 1];
+        const float *last = found.d2[most_neighbours - 1], *middle = found.d2[half - 1], *last_any = found.any[support_neighbour - 1];
         alignas(64) float any[lanes], same[lanes];
         alignas(64) uint32_t name[lanes];
-        int32_t wanted = 0, early = 0;
+        int32_t wanted = 0, early = 0, wanted_any = 0;
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = px - x[l], ry = py - y[l], rz = pz - z[l], d2 = rx * rx + ry * ry + rz * rz;
             const float agree = qx * nx[l] + qy * ny[l] + qz * nz[l];
             const float key = first + l == j ? beyond : d2;
-            any[l] = key, same[l] = agree >= same_side ? key : beyond, name[l] = j;
-            wanted |= key < last[l], early |= key < middle[l];
+            const float own = agree >= same_side ? key : beyond;
+            any[l] = key, same[l] = own, name[l] = j;
+            wanted |= own < last[l], early |= own < middle[l], wanted_any |= key < last_any[l];
         }
-        if (!wanted) return;
-        for (uint32_t k = early ? 0 : half; k < most_neighbours; ++k) insert(found.d2[k], found.id[k], same, name);
-        for (uint32_t l = 0; l < lanes; ++l) name[l] = j;
-        for (uint32_t k = 0; k < support_neighbour && early; ++k) insert(found.any[k], found.any_id[k], any, name);
+        for (uint32_t k = early ? 0 : half; k < most_neighbours && wanted; ++k) insert(found.d2[k], found.id[k], same, name);
+        for (uint32_t k = 0; k < support_neighbour && wanted_any; ++k) insert(found.any[k], found.any_id[k], any, name);
     }
     /// Those of sixteen points that lie near enough to the bundle's box.
     RILL_INLINE void offer_all(uint32_t from, const float lower[3], const float upper[3]) {
