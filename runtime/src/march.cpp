@@ -92,7 +92,8 @@ void seed_drop(Mesher& m, uint32_t i) {
 }
 
 /// Marks the cells of the tile that the disc of point i crosses, column by column along the axis its normal
-/// is nearest to. A guess is enough: the march finds what is missed.
+/// is nearest to. A guess is enough: the march finds what is missed. (Without a branch, three cells to a column, it takes
+/// half as many instructions again.)
 void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const surface::Field& f = *m.input.field;
     const surface::Patch& q = f.patches[i];

@@ -4,6 +4,9 @@
 //   support   follows the local spacing (distance to the 6th neighbour of the same side)
 //   curvature clamped, so that a degenerate neighbourhood gives a flat patch and never a spike; at .9 of a radius
 //             (at .45 honest fillets and drops cost 6 % more bytes at equal error)
+//
+// Tried for the search: first the bundles that touch one's own, then the rest: a quarter slower than the two beside it
+// in the order.
 #pragma once
 #include <cmath>
 
