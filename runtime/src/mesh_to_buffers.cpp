@@ -81,14 +81,17 @@ struct TileWriter {
         const uint32_t home = uint32_t(at[0] + 8 * at[1] + 64 * at[2]);
         uint32_t round[4];
         if ((at[u] > 0) & (at[v] > 0)) {
-            round[0] = vertex_of(tile, home - step_u - step_v, 4 * axis + 3), round[1] = vertex_of(tile, home - step_v, 4 * axis + 2);
-            round[2] = vertex_of(tile, home, 4 * axis), round[3] = vertex_of(tile, home - step_u, 4 * axis + 1);
+            round[0] = vertex_of(tile, home - step_u - step_v, 4 * axis + 3);
+            round[1] = vertex_of(tile, home - step_v, 4 * axis + 2);
+            round[2] = vertex_of(tile, home, 4 * axis);
+            round[3] = vertex_of(tile, home - step_u, 4 * axis + 1);
         } else {
             find_beyond<axis>(at, home, round);
         }
         if (!out) return;
         // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below.
-        const uint32_t turn = liquid_below ? 0 : 3, index[4] = {round[turn], round[1 ^ turn], round[2 ^ turn], round[3 ^ turn]};
+        const uint32_t turn = liquid_below ? 0 : 3;
+        const uint32_t index[4] = {round[turn], round[1 ^ turn], round[2 ^ turn], round[3 ^ turn]};
         const uint32_t s = shorter_first(m, index) ? 0 : 1;
         const uint32_t six[6] = {index[s], index[s + 1], index[s + 2],
                                  index[s], index[s + 2], index[(s + 3) & 3]};

@@ -40,8 +40,9 @@ struct Kernels {
     const char* name;
     /// Points of the field whose weight can be non-zero somewhere in the box, as surface::gather().
     uint32_t (*gather)(const Field&, const float lower[3], const float upper[3], uint32_t* out, uint32_t capacity);
-    /// Appends to a list of `found` those of n ≤ most_laid_out candidates that may have weight in the box of the batch, most_listed
-    /// at most; rows x y z, nx ny nz, 1/R², read up to the next multiple of `lanes`. Returns how many there are then.
+    /// Appends to a list of `found` those of n ≤ most_laid_out candidates that may have weight in the box of the batch,
+    /// most_listed at most; rows x y z, nx ny nz, 1/R², read up to the next multiple of `lanes`. Returns how many there
+    /// are then.
     uint32_t (*shortlist)(const float* const row[7], const uint32_t* candidates, uint32_t n, const Batch&, uint32_t* list,
                           uint32_t found);
     /// Fills all but the places in, and strikes from the list who has no weight. Returns bits of the lanes to ask the winding

@@ -59,7 +59,8 @@ RILL_INLINE uint32_t find_nearest(const Field& f, uint32_t* list, uint32_t count
 
 /// Which side of A the points of B lie on, where both clusters have weight: below, the liquid between them is thin, above,
 /// the air is. Seldom asked: summed with the rest it would cost a tenth of the blend.
-RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const float* height, float* out) {
+RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const float* height,
+                           float* out) {
     alignas(64) float side[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];

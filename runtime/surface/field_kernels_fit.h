@@ -42,8 +42,9 @@ struct Search {
 
     RILL_INLINE void offer(uint32_t j) {
         constexpr uint32_t half = most_neighbours / 2;
-        const float px = f.x[j], py = f.y[j], pz = f.z[j], qx = f.nx[j], qy = f.ny[j], qz = f.nz[j], beyond = found.beyond;
-        const float *last = found.d2[most_neighbours - 1], *middle = found.d2[half - 1], *last_any = found.any[support_neighbour - 1];
+        const float px = f.x[j], py = f.y[j], pz = f.z[j], qx = f.nx[j], qy = f.ny[j], qz = f.nz[j];
+        const float *last = found.d2[most_neighbours - 1], *middle = found.d2[half - 1];
+        const float *last_any = found.any[support_neighbour - 1], beyond = found.beyond;
         alignas(64) float any[lanes], same[lanes];
         alignas(64) uint32_t name[lanes];
         int32_t wanted = 0, early = 0, wanted_any = 0;
@@ -55,15 +56,18 @@ struct Search {
             any[l] = key, same[l] = own, name[l] = j;
             wanted |= own < last[l], early |= own < middle[l], wanted_any |= key < last_any[l];
         }
-        for (uint32_t k = early ? 0 : half; k < most_neighbours && wanted; ++k) insert(found.d2[k], found.id[k], same, name);
-        for (uint32_t k = 0; k < support_neighbour && wanted_any; ++k) insert(found.any[k], found.any_id[k], any, name);
+        for (uint32_t k = early ? 0 : half; k < most_neighbours && wanted; ++k)
+            insert(found.d2[k], found.id[k], same, name);
+        for (uint32_t k = 0; k < support_neighbour && wanted_any; ++k)
+            insert(found.any[k], found.any_id[k], any, name);
     }
     /// Those of sixteen points that lie near enough to the bundle's box.
     RILL_INLINE void offer_all(uint32_t from, const float lower[3], const float upper[3]) {
         alignas(64) uint32_t bit[lanes];
         const float *px = f.x + from, *py = f.y + from, *pz = f.z + from;
         for (uint32_t l = 0; l < lanes; ++l) {
-            const float dx = greater(greater(lower[0] - px[l], px[l] - upper[0]), 0), dy = greater(greater(lower[1] - py[l], py[l] - upper[1]), 0);
+            const float dx = greater(greater(lower[0] - px[l], px[l] - upper[0]), 0);
+            const float dy = greater(greater(lower[1] - py[l], py[l] - upper[1]), 0);
             const float dz = greater(greater(lower[2] - pz[l], pz[l] - upper[2]), 0);
             bit[l] = dx * dx + dy * dy + dz * dz <= reach * reach ? bit_of_lane[l] : 0u;
         }
@@ -89,7 +93,8 @@ RILL_INLINE void find_neighbours(const Field& f, uint32_t bundle, Nearest& found
         lower[0] = lesser(lower[0], f.x[i]), lower[1] = lesser(lower[1], f.y[i]), lower[2] = lesser(lower[2], f.z[i]);
         upper[0] = greater(upper[0], f.x[i]), upper[1] = greater(upper[1], f.y[i]), upper[2] = greater(upper[2], f.z[i]);
     }
-    Search search{f, found, f.x + first, f.y + first, f.z + first, f.nx + first, f.ny + first, f.nz + first, first, farthest * f.spacing};
+    Search search{f,            found,        f.x + first,  f.y + first, f.z + first,
+                  f.nx + first, f.ny + first, f.nz + first, first,       farthest * f.spacing};
     // The bundles beside it are near ones, mostly: with them the reach is down to little more than it takes.
     const uint32_t from = bundle ? bundle - 1 : 0, to = bundle + 1 < f.bundles.count ? bundle + 1 : bundle;
     for (uint32_t b = from; b <= to; ++b) search.offer_all(lanes * b, lower, upper);
@@ -107,9 +112,10 @@ RILL_INLINE void find_spacing(const Field& f, const Nearest& near, float* spacin
     for (uint32_t k = 0; k < most_neighbours; ++k)
         for (uint32_t l = 0; l < lanes; ++l) {
             const bool there = near.d2[k][l] < near.beyond;
-            const float distance = there ? std::sqrt(near.d2[k][l]) : before[l], more = there ? f.activity[near.id[k][l]] : 0.f;
+            const float distance = there ? std::sqrt(near.d2[k][l]) : before[l];
+            const float more = there ? f.activity[near.id[k][l]] : 0.f, some = more > 0 ? more : 1.f;
             const bool now = (reached[l] == 0) & (sum[l] + more >= support_neighbour);
-            const float between = before[l] + (distance - before[l]) * (support_neighbour - sum[l]) / (more > 0 ? more : 1.f);
+            const float between = before[l] + (distance - before[l]) * (support_neighbour - sum[l]) / some;
             spacing[l] = now ? between : spacing[l];
             reached[l] = now ? 1.f : reached[l];
             sum[l] += more, before[l] = distance;
@@ -147,8 +153,9 @@ struct Equations {
 /// Supports, areas and patches of points [from, to), all of one bundle.
 RILL_INLINE void fit(Field& f, uint32_t from, uint32_t to, const Nearest& near) {
     const uint32_t first = from / lanes * lanes;
-    alignas(64) float spacing[lanes] = {}, last2[lanes] = {}, support[lanes], area[lanes], scale[lanes], inverse_reach[lanes];
-    alignas(64) float count[lanes] = {}, s[3][lanes], t[3][lanes], quadratic[3][lanes];
+    alignas(64) float spacing[lanes] = {}, last2[lanes] = {}, count[lanes] = {};
+    alignas(64) float support[lanes], area[lanes], scale[lanes], inverse_reach[lanes];
+    alignas(64) float s[3][lanes], t[3][lanes], quadratic[3][lanes];
     find_spacing(f, near, spacing);
     for (uint32_t k = 0; k < most_neighbours; ++k)
         for (uint32_t l = 0; l < lanes; ++l) {
