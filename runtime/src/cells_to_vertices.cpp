@@ -55,14 +55,21 @@ bool doubled_beyond(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t f
     return patches_of(other).doubled >> (face ^ 1u) & 1;
 }
 
-/// The pattern of a surface cell: a face between cells of one size is turned when it is doubled from both sides.
-CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
+/// Of a cell with turned or doubled faces: a face between cells of one size is turned when it is doubled from both sides.
+CellPattern turned_pattern(const Mesher& m, const Tile& tile, uint32_t cell) {
     const CellPattern plain = plain_pattern(tile, cell);
     const uint32_t doubled = plain.turned() ? patches_of(plain).doubled : cell_patches[plain.signs()].doubled;
     uint32_t turned = plain.turned();
     for (uint32_t face = 0; doubled >> face; ++face)
         if (doubled >> face & 1 && doubled_beyond(m, tile, cell, face)) turned |= 1u << face;
     return pattern_of(plain.signs(), turned);
+}
+
+/// The pattern of a surface cell.
+CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
+    const uint32_t signs = corner_signs(tile, cell);
+    const bool plain = !cell_patches[signs].doubled && !(tile.beside & every_finer);
+    return plain ? pattern_of(signs, 0) : turned_pattern(m, tile, cell);
 }
 
 /// Block by block of 4³: vertices next to each other share what they are evaluated from.
@@ -98,16 +105,23 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
     return tile.value + cell % 8 + 9 * (cell / 8 % 8 + 9 * (cell / 64));
 }
 
+/// Adds a crossing to the sum of its patch, and one to its number.
+void add_crossing(const EdgePlace& edge, const float* value, float (&total)[4]) {
+    const float low = value[edge.low], crossing = low / (low - value[edge.high]);
+    for (uint32_t a = 0; a < 4; ++a) total[a] += edge.corner[a] + crossing * edge.along[a];
+}
+
 /// Appends the patches of a cell to the batch: mean of their crossings.
 void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
     const float* value = corner_values(tile, cell);
     float sum[4][4] = {};
-    for_bits(patches.crossed, [&](uint32_t e) {
-        const EdgePlace& edge = edge_places[e];
-        const float low = value[edge.low], high = value[edge.high], crossing = low / (low - high);
-        float* total = sum[patches.patch[e]];
-        for (uint32_t a = 0; a < 4; ++a) total[a] += edge.corner[a] + crossing * edge.along[a];
-    });
+    if (patches.count == 1) {  // nearly all: sums that stay in registers
+        float total[4] = {};
+        for_bits(patches.crossed, [&](uint32_t e) { add_crossing(edge_places[e], value, total); });
+        std::copy(total, total + 4, sum[0]);
+    } else {
+        for_bits(patches.crossed, [&](uint32_t e) { add_crossing(edge_places[e], value, sum[patches.patch[e]]); });
+    }
     const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     for (uint32_t p = 0; p < patches.count; ++p, ++n) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};

@@ -73,7 +73,7 @@ void start_attempt(Mesher& m) {
     m.tile_count = m.order_count = m.kept = 0;
     m.active_count = m.next_active_count = m.colour = 0;
     m.tiles_ran_out = false, m.seeding = true;
-    m.phase = MeshPhase::march;
+    m.phase = 0;
     std::memset(m.hash, 0, (size_t(m.hash_mask) + 1) * sizeof(uint32_t));
 }
 
@@ -87,49 +87,44 @@ bool start_coarser(Mesher& m, float octaves) {
     return true;
 }
 
-/// Runs what is serial until there are tasks, or all is done.
-uint32_t prepare_mesh(void* mesher) {
+uint32_t prepare_round(void* mesher) {
     constexpr float octaves_when_late = 1;
     Mesher& m = *static_cast<Mesher*>(mesher);
-    for (;;) {
-        uint32_t tasks = 0;
-        switch (m.phase) {
-            case MeshPhase::march:
-                if (m.input.late && m.input.late(m.input.user) && start_coarser(m, octaves_when_late))
-                    m.cut |= cut_time;
-                tasks = prepare_march(mesher), m.run = run_march;
-                if (!tasks) m.phase = MeshPhase::find_specks;
-                break;
-            case MeshPhase::find_specks:
-                tasks = prepare_find_specks(mesher), m.run = run_find_specks;
-                m.phase = MeshPhase::turn_specks;
-                break;
-            case MeshPhase::turn_specks:
-                prepare_turn_specks(mesher);
-                m.phase = MeshPhase::counts;
-                break;
-            case MeshPhase::counts:
-                tasks = prepare_counts(mesher), m.run = run_counts;
-                m.phase = MeshPhase::vertices;
-                break;
-            case MeshPhase::vertices:
-                m.phase = MeshPhase::quads;
-                lay_out(m);
-                if (m.too_large > 0 && start_coarser(m, m.too_large)) break;
-                tasks = prepare_vertices(mesher), m.run = run_vertices;
-                break;
-            case MeshPhase::quads:
-                tasks = prepare_quads(mesher), m.run = run_quads;
-                m.phase = MeshPhase::ranges;
-                break;
-            case MeshPhase::ranges:
-                prepare_ranges(mesher);
-                m.phase = MeshPhase::done;
-                break;
-            case MeshPhase::done: return 0;
-        }
-        if (tasks) return tasks;
+    if (m.input.late && m.input.late(m.input.user) && start_coarser(m, octaves_when_late)) m.cut |= cut_time;
+    return prepare_march(mesher);
+}
+
+uint32_t prepare_layout(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    lay_out(m);
+    if (m.too_large > 0) start_coarser(m, m.too_large);
+    return 0;
+}
+
+constexpr Stage phases[] = {
+    {prepare_round, run_march, true},
+    {prepare_find_specks, run_find_specks, false},
+    {prepare_turn_specks, nullptr, false},
+    {prepare_counts, run_counts, false},
+    {prepare_layout, nullptr, false},
+    {prepare_vertices, run_vertices, false},
+    {prepare_quads, run_quads, false},
+    {prepare_ranges, nullptr, false},
+};
+constexpr uint32_t phase_count = sizeof(phases) / sizeof(phases[0]);
+
+/// Runs what is serial until there are tasks, or all is done. A phase may start the whole anew, with larger cells.
+uint32_t prepare_mesh(void* mesher) {
+    Mesher& m = *static_cast<Mesher*>(mesher);
+    while (m.phase < phase_count) {
+        const uint32_t index = m.phase++;
+        const uint32_t tasks = phases[index].prepare(mesher);
+        if (!tasks || !phases[index].run) continue;
+        if (phases[index].repeats) m.phase = index;
+        m.run = phases[index].run;
+        return tasks;
     }
+    return 0;
 }
 
 void run_mesh(void* mesher, uint32_t task, uint32_t worker) { static_cast<Mesher*>(mesher)->run(mesher, task, worker); }

@@ -92,7 +92,8 @@ void seed_drop(Mesher& m, uint32_t i) {
 }
 
 /// Marks the cells of the tile that the disc of point i crosses, column by column along the axis its normal
-/// is nearest to. A guess is enough: the march finds what is missed.
+/// is nearest to. A guess is enough: the march finds what is missed. (Without a branch, three cells to a column, it takes
+/// half as many instructions again.)
 void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const surface::Field& f = *m.input.field;
     const surface::Patch& q = f.patches[i];
@@ -115,22 +116,27 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
                                                      : (std::abs(n[1]) > std::abs(n[2]) ? 1 : 2);
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    // In the plane r = r_u (e_u + slope_u e_axis) + r_v (e_v + slope_v e_axis); its square, and the quadratic above it.
     const float slope_u = -n[u] / n[axis], slope_v = -n[v] / n[axis], bend = -tile.cell / n[axis];
+    const float own[3] = {q.xx, q.yy, q.zz}, mixed[3] = {q.yz, q.xz, q.xy};  // mixed: of the other two axes
+    const float uu = bend * (own[u] + slope_u * (mixed[v] + slope_u * own[axis]));
+    const float vv = bend * (own[v] + slope_v * (mixed[u] + slope_v * own[axis]));
+    const float uv = bend * (mixed[axis] + slope_u * mixed[u] + slope_v * mixed[v] + 2 * slope_u * slope_v * own[axis]);
     const float half = 0.5f * (std::abs(slope_u) + std::abs(slope_v));
-    float r[3];
     int cell[3];
-    for (cell[v] = from[v]; cell[v] <= to[v]; ++cell[v])
+    for (cell[v] = from[v]; cell[v] <= to[v]; ++cell[v]) {
+        const float rv = float(cell[v]) + 0.5f - at[v];
+        const float nearest = radius * radius - (1 + slope_v * slope_v) * rv * rv, skew = 2 * slope_u * slope_v * rv;
+        const float slope = slope_u + uv * rv, height = at[axis] + (slope_v + vv * rv) * rv;
         for (cell[u] = from[u]; cell[u] <= to[u]; ++cell[u]) {
-            r[u] = float(cell[u]) + 0.5f - at[u], r[v] = float(cell[v]) + 0.5f - at[v];
-            r[axis] = slope_u * r[u] + slope_v * r[v];  // in the plane; then by the quadratic above it
-            if (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > radius * radius) continue;
-            const float above = q.xx * r[0] * r[0] + q.yy * r[1] * r[1] + q.zz * r[2] * r[2] +
-                                q.xy * r[0] * r[1] + q.xz * r[0] * r[2] + q.yz * r[1] * r[2];
-            const float middle = at[axis] + r[axis] + bend * above;
+            const float ru = float(cell[u]) + 0.5f - at[u];
+            if (((1 + slope_u * slope_u) * ru + skew) * ru > nearest) continue;
+            const float middle = height + (slope + uu * ru) * ru;
             const int last = int(std::clamp(middle + half + 1, 0.f, 8.f)) - 1;  // rounds down from −1 up
             cell[axis] = int(std::clamp(middle - half, 0.f, 8.f));
             for (; cell[axis] <= last; ++cell[axis]) want(tile, cell);
         }
+    }
 }
 
 void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
@@ -162,11 +168,12 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
         for (uint32_t z = from_z; z < to_z; ++z)
             for (uint32_t y = from_y; y < to_y; ++y) {
                 const uint32_t row = y + 9 * z;
-                uint32_t bits = need[row] & ~uint32_t(tile.known[row] | hanging[row]) & (octant & 1 ? 0x1e0 : 0x01f);
+                const uint32_t bits = need[row] & ~uint32_t(tile.known[row] | hanging[row]) & (octant & 1 ? 0x1e0 : 0x01f);
+                if (!bits) continue;
                 tile.known[row] |= uint16_t(bits);
                 const float py = place[1][y], pz = place[2][z];
                 for_bits(bits, [&](uint32_t x) {
-                    s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x + 9 * row);
+                    s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x | row << 4);
                 });
             }
     }
@@ -178,8 +185,9 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
     for (uint32_t i = 0; i < n; ++i) {
         // Where nothing is known there is air; this also catches what is not a number.
         const float value = std::abs(s.value[i]) < surface::unsupported ? s.value[i] : tile.cell;
-        tile.value[s.slot[i]] = value;
-        tile.inside[s.slot[i] / 9] |= uint16_t(uint32_t(value < 0) << (s.slot[i] % 9));
+        const uint32_t row = s.slot[i] >> 4, x = s.slot[i] & 15;
+        tile.value[x + 9 * row] = value;
+        tile.inside[row] |= uint16_t(uint32_t(value < 0) << x);
     }
     if (mixed) settle_hanging(tile, hanging, need);
 }

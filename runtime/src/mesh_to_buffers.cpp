@@ -74,29 +74,46 @@ struct TileWriter {
     Neighbourhood near;
     uint32_t* out;  ///< null: not wanted
 
+    /// The four cells round the edge along `axis` from the lower corner of cell `home`, at `at`.
     template <uint32_t axis>
     void quad(const int (&at)[3], bool liquid_below) {
-        constexpr uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-        uint32_t index[4];
-        // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below. Per cell
-        // around the edge: one down along u (1) and v (2)?
-        constexpr uint32_t down[4] = {3, 2, 0, 1};
-        const uint32_t inner = (at[u] > 0 ? 1u : 0u) | (at[v] > 0 ? 2u : 0u), turn = liquid_below ? 0 : 3;
+        constexpr uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3, step_u = 1u << 3 * u, step_v = 1u << 3 * v;
         const uint32_t home = uint32_t(at[0] + 8 * at[1] + 64 * at[2]);
-        for (uint32_t k = 0; k < 4; ++k) {
-            const uint32_t step = down[k ^ turn], beyond = step & ~inner, edge = 4 * axis + step;
-            // A step out of the tile comes in on the far side of the one beyond.
-            const uint32_t cell = home - ((step & 1) << 3 * u) - (step >> 1 << 3 * v) + ((beyond & 1) << (3 * u + 3)) +
-                                  (beyond >> 1 << (3 * v + 3));
-            index[k] = vertex_of(*near.tile[(beyond & 1) << u | beyond >> 1 << v], cell, edge);
-            if (beyond) cover(tile, m.position + 3 * size_t(index[k]));
+        uint32_t round[4];
+        if ((at[u] > 0) & (at[v] > 0)) {
+            round[0] = vertex_of(tile, home - step_u - step_v, 4 * axis + 3);
+            round[1] = vertex_of(tile, home - step_v, 4 * axis + 2);
+            round[2] = vertex_of(tile, home, 4 * axis);
+            round[3] = vertex_of(tile, home - step_u, 4 * axis + 1);
+        } else {
+            find_beyond<axis>(at, home, round);
         }
         if (!out) return;
+        // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below.
+        const uint32_t turn = liquid_below ? 0 : 3;
+        const uint32_t index[4] = {round[turn], round[1 ^ turn], round[2 ^ turn], round[3 ^ turn]};
         const uint32_t s = shorter_first(m, index) ? 0 : 1;
         const uint32_t six[6] = {index[s], index[s + 1], index[s + 2],
                                  index[s], index[s + 2], index[(s + 3) & 3]};
         std::memcpy(out, six, sizeof(six));
         out += 6;
+    }
+
+private:
+    /// Some of the four lie in other tiles.
+    template <uint32_t axis>
+    void find_beyond(const int (&at)[3], uint32_t home, uint32_t (&round)[4]) {
+        constexpr uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+        constexpr uint32_t down[4] = {3, 2, 0, 1};  // one down along u (1) and v (2)?
+        const uint32_t inner = (at[u] > 0 ? 1u : 0u) | (at[v] > 0 ? 2u : 0u);
+        for (uint32_t k = 0; k < 4; ++k) {
+            const uint32_t step = down[k], beyond = step & ~inner, edge = 4 * axis + step;
+            // A step out of the tile comes in on the far side of the one beyond.
+            const uint32_t cell = home - ((step & 1) << 3 * u) - (step >> 1 << 3 * v) + ((beyond & 1) << (3 * u + 3)) +
+                                  (beyond >> 1 << (3 * v + 3));
+            round[k] = vertex_of(*near.tile[(beyond & 1) << u | beyond >> 1 << v], cell, edge);
+            if (beyond) cover(tile, m.position + 3 * size_t(round[k]));
+        }
     }
 };
 
@@ -131,11 +148,13 @@ bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept {
         const float* q = m.position + 3 * size_t(index[k]);
         p[k] = {q[0], q[1], q[2]};
     }
+    const auto facing = [&](uint32_t from) {  // one way, when split there
+        const Vector &q = p[from], across = p[from + 2] - q;
+        return dot(cross(p[from + 1] - q, across), cross(across, p[(from + 3) & 3] - q)) > 0;
+    };
     const Vector a = p[2] - p[0], b = p[3] - p[1];
-    const float first = dot(cross(p[1] - p[0], a), cross(a, p[3] - p[0]));
-    const float second = dot(cross(p[2] - p[1], b), cross(b, p[0] - p[1]));
-    if ((first > 0) != (second > 0)) return first > 0;
-    return dot(a, a) <= dot(b, b);
+    const bool first = dot(a, a) <= dot(b, b);
+    return facing(first ? 0 : 1) || !facing(first ? 1 : 0) ? first : !first;
 }
 
 void cover(Tile& tile, const float position[3]) noexcept {

@@ -93,8 +93,6 @@ struct OrderedTile {
     static constexpr uint32_t group_shift = 6;  ///< key >> group_shift names the group
 };
 
-enum class MeshPhase : uint8_t { march, find_specks, turn_specks, counts, vertices, quads, ranges, done };
-
 struct Mesher {
     MeshLimits limits;
     MeshInput input;
@@ -103,7 +101,7 @@ struct Mesher {
     uint32_t vertices_wanted, indices_wanted, ranges_wanted;  ///< the most of all attempts
     uint32_t vertices_found;   ///< by this attempt
     float octaves, too_large;  ///< given up; how many too few those were, found by lay_out()
-    MeshPhase phase;
+    uint32_t phase;            ///< the next, of those in field_to_mesh.cpp
     void (*run)(void* mesher, uint32_t task, uint32_t worker);  ///< of the tasks that are out
 
     Tile* tiles;

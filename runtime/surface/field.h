@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The surface that a set of points and drops means: neighbour grid, local quadratics, blended
+// The surface that a set of points and drops means: neighbours, local quadratics, blended
 // implicit function. This definition binds cooker and runtime alike: the cooker places points so
 // that THIS function fits the source.
 //
 // Method: Keeler & Bridson, "Compact Iso-Surface Representation and Compression for Fluid
 // Phenomena", section 2: Γ_i(x) = d + n·r + a τ1² + b τ1 τ2 + c τ2² (eq. 1), a, b, c by minimal-norm
 // least squares over neighbours (eq. 2), blended with compact weights. Measured departures from
-// the paper stand in field.cpp, field_rules.h and field_kernels.cpp.
+// the paper stand in field_rules.h, field_kernels_fit.h and field_kernels_blend.h.
 //
 // Sign: negative in the liquid, positive in the air; about a distance (metres) near the surface.
 // Everything is a pure function of (points, drops, x): no order, thread or tile changes a bit.
@@ -23,11 +23,13 @@ struct Box {
     float lower[3], upper[3];
 };
 
-/// Points of one region, or clusters of a wider one, as a single oriented disc, for the winding number.
-struct Cluster {
-    float centre[3], area[3];  ///< area: Σ area · normal / 4π
-    float limit;               ///< squared distance from which it counts as one disc
-    uint32_t first, last;      ///< into Field::cluster_member, or Field::clusters
+/// Each sixteen neighbours in the sorted order as one, row by row and padded to whole sixteens: bundle k holds points
+/// or smaller bundles [16 k, 16 k + 16).
+struct Bundles {
+    uint32_t count;
+    float *x, *y, *z, *ax, *ay, *az;  ///< an oriented disc, for the winding number: centre, Σ area · normal / 4π
+    float* limit;                     ///< squared distance from which it counts as one disc
+    float *lower[3], *upper[3];       ///< box of the points; from finish_field() on of all places where they have weight
 };
 
 struct Kernels;
@@ -43,7 +45,7 @@ struct alignas(64) Patch {
 
 /// All memory is the caller's: one block of field_bytes(), 64-byte aligned.
 struct Field {
-    // Points sorted by grid cell (ties by input index), and their local quadratics.
+    // Points, sorted so that each sixteen lie together, and their local quadratics.
     uint32_t point_count, drop_count;
     Patch* patches;
     float *x, *y, *z;                      ///< position
@@ -55,28 +57,21 @@ struct Field {
     uint32_t* source;                      ///< index in the PointSet each came from
     // Drops as they came, with inverse shape and mean radius.
     float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
-    // Dense uniform grid over the points: cell c holds sorted points [cell_start[c], cell_start[c+1]).
-    uint32_t* cell_start;
-    uint32_t grid_size[3];
-    float grid_origin[3], grid_cell;
-    Cluster *clusters, *groups;
-    uint32_t* cluster_member;              ///< sorted points, cluster by cluster
-    uint32_t cluster_count, group_count;
+    Bundles bundles, groups;               ///< of points; of bundles
+    float spacing;                         ///< about the distance of points
     const Kernels* kernels;                ///< what evaluation runs on
-    float largest_support, largest_reach;  ///< over points; over drops
-    float lower[3], upper[3];              ///< of everything with weight
+    float largest_support;
 };
 
 /// Bytes that a field of at most so many points and drops needs.
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept;
 
-/// Step 1, one thread: sorts the points into the grid inside `memory`. Non-finite points are
-/// dropped. O(n).
+/// Step 1, one thread: sorts the points inside `memory`. Non-finite points are dropped. O(n log n).
 void begin_field(Field& field, void* memory, const format::PointSet& points,
                  const format::DropSet& drops) noexcept;
 /// Step 2, any threads, disjoint ranges [first, last) of sorted points: supports and quadratics.
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
-/// Step 3, one thread: largest support, bounds.
+/// Step 3, one thread: bundles, largest support.
 void finish_field(Field& field) noexcept;
 
 /// Patches and drops whose weight can be non-zero somewhere in the box, ascending; drops are numbered
@@ -86,7 +81,7 @@ uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capa
 
 /// Field values at n positions, from candidates that gather() gave for a box holding them all.
 /// Where no patch has weight there is no gradient, the winding number of all points gives the sign, and the nearest
-/// point about the distance: in the liquid at most a grid cell, in the air at most the largest support, beyond it
+/// point about the distance: in the liquid at most Field::spacing, in the air at most the largest support, beyond it
 /// +unsupported. Positions next to each other in the list should be next to each other in space: batches of 16 share
 /// what they are evaluated from.
 inline constexpr float unsupported = 1e30f;

@@ -11,17 +11,6 @@
 namespace rill::surface {
 namespace {
 
-constexpr uint32_t most_listed = 1024;  // patches that a batch may blend
-constexpr uint32_t chunk = most_reached;  // candidates looked at together
-
-/// Work(number) for each of the first n bits that is set, 16 to a word.
-template <typename Work>
-void for_bits(const uint32_t* words, uint32_t n, Work&& work) {
-    for (uint32_t first = 0; first < n; first += lanes)
-        rill::for_bits(words[first / lanes] & (n - first < lanes ? (1u << (n - first)) - 1 : ~0u),
-                       [&](uint32_t bit) { work(first + bit); });
-}
-
 /// What results go to; null: not wanted.
 struct Results {
     float *value, *gx, *gy, *gz, *vx, *vy, *vz;
@@ -31,73 +20,51 @@ struct Results {
 class Shortlist {
 public:
     Shortlist(const Field& f, const uint32_t* candidates, uint32_t count) : f_(f), candidates_(candidates), count_(count) {
-        if (count_ <= chunk) lay_out(0);
+        if (count_ <= most_laid_out) lay_out(0);
     }
     /// Up to most_listed of them, ascending; returns how many there are.
-    uint32_t list(const Box& box, uint32_t* out) {
+    uint32_t list(const Batch& batch, uint32_t* out) {
+        const float* rows[7];
+        for (int k = 0; k < 7; ++k) rows[k] = row_[k];
         uint32_t found = 0;
-        for (uint32_t first = 0; first < count_; first += chunk) {
-            if (count_ > chunk) lay_out(first);
-            const float* rows[7];
-            for (int k = 0; k < 7; ++k) rows[k] = row_[k];
-            const uint32_t n = std::min(chunk, count_ - first);
-            uint32_t within[chunk / lanes];
-            f_.kernels->reach(rows, n, box.lower, box.upper, within);
-            for_bits(within, n, [&](uint32_t c) { out[std::min(found++, most_listed - 1)] = candidates_[first + c]; });
+        for (uint32_t first = 0; first < count_; first += most_laid_out) {
+            if (count_ > most_laid_out) lay_out(first);
+            found = f_.kernels->shortlist(rows, candidates_ + first, std::min(most_laid_out, count_ - first), batch, out, found);
         }
         return found;
     }
 
 private:
     void lay_out(uint32_t first) {
-        for (uint32_t c = 0; c < std::min(chunk, count_ - first); ++c) {
+        const uint32_t n = std::min(most_laid_out, count_ - first);
+        for (uint32_t c = 0; c < n; ++c) {
             const Patch& p = f_.patches[candidates_[first + c]];
             const float value[7] = {p.x, p.y, p.z, p.nx, p.ny, p.nz, p.inverse};
             for (int k = 0; k < 7; ++k) row_[k][c] = value[k];
         }
+        for (uint32_t c = n; c < (n + lanes - 1) / lanes * lanes; ++c)
+            for (int k = 0; k < 7; ++k) row_[k][c] = 0;
     }
     const Field& f_;
     const uint32_t* candidates_;
     uint32_t count_;
-    float row_[7][chunk] = {};
+    alignas(64) float row_[7][most_laid_out];
 };
 
-/// Positions whose sign the winding number decides: gathered from many batches, asked for together.
-class Doubts {
-public:
-    Doubts(const Field& f, const Results& out) : f_(f), out_(out) {}
-    ~Doubts() { settle(); }
-    void add(const Batch& b, uint32_t l, uint32_t index) {
-        x_[count_] = b.x[l], y_[count_] = b.y[l], z_[count_] = b.z[l];
-        far_[count_] = b.u2[l] > core, index_[count_++] = index;
-        if (count_ == lanes) settle();
-    }
-
-private:
-    void settle() {
-        if (count_ == 0) return;
-        for (uint32_t l = count_; l < lanes; ++l) x_[l] = x_[0], y_[l] = y_[0], z_[l] = z_[0];
-        alignas(64) float winding[lanes], distance2[lanes];
-        f_.kernels->winding(f_, x_, y_, z_, winding, distance2);
-        for (uint32_t l = 0; l < count_; ++l) overrule(index_[l], winding[l], std::sqrt(distance2[l]), far_[l]);
-        count_ = 0;
-    }
-    void overrule(uint32_t i, float winding, float distance, bool far) {
-        // Between wide patches the discs are too coarse to ask: then the blend stands, if there is one.
-        const float doubt = far ? likely : sure;
-        const bool certain = winding < doubt || winding > 1 - doubt, inside = winding > 0.5f;
-        const bool unknown = out_.value[i] >= unsupported;
-        if (!unknown && !(certain && (far || inside != (out_.value[i] < 0)))) return;
-        out_.value[i] = inside ? -std::min(distance, f_.grid_cell) : distance < f_.largest_support ? distance : unsupported;
-        for (float* row : {out_.gx, out_.gy, out_.gz, out_.vx, out_.vy, out_.vz})
-            if (row) row[i] = 0;
-    }
-    const Field& f_;
-    const Results& out_;
-    alignas(64) float x_[lanes], y_[lanes], z_[lanes];
-    uint32_t index_[lanes], count_ = 0;
-    bool far_[lanes];
-};
+/// Where the blend alone does not decide: asks the winding number, and overrules where that is sure.
+void settle(const Field& f, const Batch& b, uint32_t l, uint32_t i, const Results& out) {
+    float distance2;
+    const float winding = f.kernels->winding(f, b.x[l], b.y[l], b.z[l], distance2);
+    // Between wide patches the discs are too coarse to ask: then the blend stands, if there is one.
+    const bool far = b.u2[l] > core;
+    const float doubt = far ? likely : sure, distance = std::sqrt(distance2);
+    const bool certain = winding < doubt || winding > 1 - doubt, inside = winding > 0.5f;
+    const bool unknown = out.value[i] >= unsupported;
+    if (!unknown && !(certain && (far || inside != (out.value[i] < 0)))) return;
+    out.value[i] = inside ? -std::min(distance, f.spacing) : distance < f.largest_support ? distance : unsupported;
+    for (float* row : {out.gx, out.gy, out.gz, out.vx, out.vy, out.vz})
+        if (row) row[i] = 0;
+}
 
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const float* x, const float* y,
                const float* z, uint32_t n, const Results& out) {
@@ -125,59 +92,51 @@ void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const
     }
 }
 
-/// The last position fills unused lanes: no branch in the kernels.
-Box load(Batch& b, const float* x, const float* y, const float* z, uint32_t n) {
-    Box box{{x[0], y[0], z[0]}, {x[0], y[0], z[0]}};
-    for (uint32_t l = 0; l < lanes; ++l) {
-        const uint32_t i = std::min(l, n - 1);
-        b.x[l] = x[i], b.y[l] = y[i], b.z[l] = z[i];
-        box.lower[0] = std::min(box.lower[0], x[i]), box.upper[0] = std::max(box.upper[0], x[i]);
-        box.lower[1] = std::min(box.lower[1], y[i]), box.upper[1] = std::max(box.upper[1], y[i]);
-        box.lower[2] = std::min(box.lower[2], z[i]), box.upper[2] = std::max(box.upper[2], z[i]);
+/// The first position fills unused lanes: no branch in the kernels.
+void load(float* to, const float* from, uint32_t n) {
+    if (n == lanes) {
+        std::copy(from, from + lanes, to);
+        return;
     }
-    return box;
+    std::fill(std::copy(from, from + n, to), to + lanes, from[0]);
 }
 
 struct Evaluation {
     const Field& f;
     const Results& out;
     Shortlist& shortlist;
-    Doubts& doubts;
     float trusted_value;  ///< up to this, values are not doubted
-    uint32_t list[most_listed];
     Batch batch;
+    uint32_t list[most_listed];
+
+    Evaluation(const Field& field, const Results& results, Shortlist& of, float trusted)
+        : f(field), out(results), shortlist(of), trusted_value(trusted) {}
 
     /// n ≤ lanes positions; results go to index `first` on.
     void run(const float* x, const float* y, const float* z, uint32_t n, uint32_t first) {
-        const Box box = load(batch, x, y, z, n);
-        uint32_t count = shortlist.list(box, list);
+        load(batch.x, x, n), load(batch.y, y, n), load(batch.z, z, n);
+        uint32_t count = shortlist.list(batch, list);
         if (count > most_listed && n > 1) {
             // A crowd: one by one, so that what each leaves out depends on itself alone.
             for (uint32_t l = 0; l < n; ++l) run(x + l, y + l, z + l, 1, first + l);
             return;
         }
         count = std::min(count, most_listed);
+        uint32_t doubts = ~0u;
         if (count)
-            f.kernels->blend(f, list, count, batch);
+            doubts = f.kernels->blend(f, list, count, trusted_value, batch);
         else
-            for (uint32_t l = 0; l < lanes; ++l)
-                batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0, batch.doubt[l] = 1;
+            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0;
         std::copy(batch.value, batch.value + n, out.value + first);
         if (out.gx) write_slopes(count, n, first);
-        int32_t any = 0;
-        for (uint32_t l = 0; l < lanes; ++l) any |= batch.doubt[l] &= std::fabs(batch.value[l]) > trusted_value;
-        for (uint32_t l = 0; any && f.point_count && l < n; ++l)
-            if (batch.doubt[l]) doubts.add(batch, l, first + l);
+        if (f.point_count) for_bits(doubts & ((1u << n) - 1), [&](uint32_t l) { settle(f, batch, l, first + l, out); });
     }
     void write_slopes(uint32_t count, uint32_t n, uint32_t first) {
-        Slopes sum;
-        f.kernels->slope(f, list, count, batch, out.vx != nullptr, sum);
-        for (uint32_t l = 0; l < n; ++l) {
-            const uint32_t i = first + l;
-            const float s = batch.weight[l] > 0 ? 1 / batch.weight[l] : 0;
-            out.gx[i] = sum.gx[l] * s, out.gy[i] = sum.gy[l] * s, out.gz[i] = sum.gz[l] * s;
-            if (out.vx) out.vx[i] = sum.vx[l] * s, out.vy[i] = sum.vy[l] * s, out.vz[i] = sum.vz[l] * s;
-        }
+        Slopes mean;
+        f.kernels->slope(f, list, count, batch, out.vx != nullptr, mean);
+        const float* from[6] = {mean.gx, mean.gy, mean.gz, mean.vx, mean.vy, mean.vz};
+        float* const to[6] = {out.gx, out.gy, out.gz, out.vx, out.vy, out.vz};
+        for (int k = 0; k < (out.vx ? 6 : 3); ++k) std::copy(from[k], from[k] + n, to[k] + first);
     }
 };
 
@@ -186,8 +145,7 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
     const uint32_t points = uint32_t(std::lower_bound(candidates, candidates + count, f.point_count) - candidates);
     {
         Shortlist shortlist(f, candidates, points);
-        Doubts doubts(f, out);
-        Evaluation evaluation{f, out, shortlist, doubts, trusted_value, {}, {}};
+        Evaluation evaluation(f, out, shortlist, trusted_value);
         for (uint32_t first = 0; first < n; first += lanes)
             evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
     }
@@ -197,30 +155,7 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
 }  // namespace
 
 uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity) noexcept {
-    uint32_t found = 0;
-    const auto take = [&](uint32_t i) {
-        if (found < capacity) out[found] = i;
-        ++found;
-    };
-    int from[3], to[3];
-    for (int a = 0; a < 3; ++a) {
-        const float size = float(f.grid_size[a]);
-        from[a] = int(std::clamp((box.lower[a] - f.largest_support - f.grid_origin[a]) / f.grid_cell - 0.01f, 0.f, size));
-        to[a] = int(std::clamp((box.upper[a] + f.largest_support - f.grid_origin[a]) / f.grid_cell + 0.01f, -1.f, size - 1));
-    }
-    uint32_t within[chunk / lanes];
-    for (int z = from[2]; f.point_count && z <= to[2]; ++z)
-        for (int y = from[1]; y <= to[1]; ++y) {
-            const uint32_t row = (uint32_t(z) * f.grid_size[1] + uint32_t(y)) * f.grid_size[0];
-            if (from[0] > to[0]) continue;
-            const uint32_t last = f.cell_start[row + uint32_t(to[0]) + 1];
-            for (uint32_t j = f.cell_start[row + uint32_t(from[0])]; j < last; j += chunk) {
-                const float* const rows[7] = {f.x + j, f.y + j, f.z + j, f.nx + j, f.ny + j, f.nz + j, f.steep + j};
-                const uint32_t n = std::min(chunk, last - j);
-                f.kernels->reach(rows, n, box.lower, box.upper, within);
-                for_bits(within, n, [&](uint32_t c) { take(j + c); });
-            }
-        }
+    uint32_t found = f.kernels->gather(f, box.lower, box.upper, out, capacity);
     for (uint32_t d = 0; d < f.drop_count; ++d) {
         const float p[3] = {f.dx[d], f.dy[d], f.dz[d]};
         float d2 = 0;
@@ -228,7 +163,9 @@ uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity
             const float r = std::max({box.lower[a] - p[a], p[a] - box.upper[a], 0.f});
             d2 += r * r;
         }
-        if (d2 < f.reach[d] * f.reach[d]) take(f.point_count + d);
+        if (!(d2 < f.reach[d] * f.reach[d])) continue;
+        if (found < capacity) out[found] = f.point_count + d;
+        ++found;
     }
     return found;
 }

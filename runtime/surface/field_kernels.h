@@ -7,7 +7,12 @@
 namespace rill::surface {
 
 struct Field;
-inline constexpr uint32_t lanes = 16, most_reached = 128;
+inline constexpr uint32_t lanes = 16;
+inline constexpr uint32_t most_laid_out = 128;    // candidates
+inline constexpr uint32_t most_listed = 1024;     // patches that a batch may blend
+inline constexpr uint32_t most_neighbours = 14;   // rows of a fit
+inline constexpr uint32_t support_neighbour = 6;  // whose distance gives the support
+inline constexpr float nowhere = 1e12f;           // place of what fills whole sixteens up
 
 /// Sixteen positions and what was found there.
 struct alignas(64) Batch {
@@ -16,23 +21,40 @@ struct alignas(64) Batch {
     float sign[lanes];                  ///< 1: the value is that of cluster A, −1: of B, 0: of none
     float u2[lanes];  ///< least of any patch; `unsupported` for none: in a thin sheet the nearest may be of the other face
     float nx[lanes], ny[lanes], nz[lanes];  ///< normal of the nearest point
-    int32_t doubt[lanes];  ///< 1: the winding number should be asked, 0
 };
-/// Sums over the patches of the chosen cluster, still to be divided by the weight.
+/// Means over the patches of the chosen cluster.
 struct alignas(64) Slopes {
     float gx[lanes], gy[lanes], gz[lanes], vx[lanes], vy[lanes], vz[lanes];
 };
 
+/// The nearest neighbours of sixteen points that face the same way, nearest first, and those of either side: squared
+/// distances, `beyond` for none.
+struct alignas(64) Nearest {
+    float d2[most_neighbours][lanes], any[support_neighbour][lanes];
+    uint32_t id[most_neighbours][lanes];
+    uint32_t any_id[support_neighbour][lanes];  ///< not read: without it compilers insert lane by lane
+    float beyond;
+};
+
 struct Kernels {
     const char* name;
-    /// Which of n ≤ most_reached points may have weight in the box, 16 to a word: rows x y z, nx ny nz, 1/R², read up to
-    /// the next multiple of `lanes`; bits beyond n mean nothing.
-    void (*reach)(const float* const point[7], uint32_t n, const float lower[3], const float upper[3],
-                  uint32_t* within);
-    void (*blend)(const Field&, const uint32_t* list, uint32_t count, Batch&);
+    /// Points of the field whose weight can be non-zero somewhere in the box, as surface::gather().
+    uint32_t (*gather)(const Field&, const float lower[3], const float upper[3], uint32_t* out, uint32_t capacity);
+    /// Appends to a list of `found` those of n ≤ most_laid_out candidates that may have weight in the box of the batch,
+    /// most_listed at most; rows x y z, nx ny nz, 1/R², read up to the next multiple of `lanes`. Returns how many there
+    /// are then.
+    uint32_t (*shortlist)(const float* const row[7], const uint32_t* candidates, uint32_t n, const Batch&, uint32_t* list,
+                          uint32_t found);
+    /// Fills all but the places in, and strikes from the list who has no weight. Returns bits of the lanes to ask the winding
+    /// number for: none up to |value| `trusted`.
+    uint32_t (*blend)(const Field&, uint32_t* list, uint32_t& count, float trusted, Batch&);
     void (*slope)(const Field&, const uint32_t* list, uint32_t count, const Batch&, bool velocity, Slopes&);
-    /// Winding number of all points, and about the squared distance to the nearest.
-    void (*winding)(const Field&, const float* x, const float* y, const float* z, float* number, float* distance2);
+    /// Winding number of all points at a position, and about the squared distance to the nearest.
+    float (*winding)(const Field&, float x, float y, float z, float& distance2);
+    /// Neighbours of the points of a bundle.
+    void (*nearest)(const Field&, uint32_t bundle, Nearest&);
+    /// Supports and quadratics of points [first, last) of that bundle.
+    void (*fit)(Field&, uint32_t first, uint32_t last, const Nearest&);
 };
 
 /// Slowest first; with GCC the first is compiled without vectors, for reference. All give the same bits.

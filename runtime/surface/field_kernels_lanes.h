@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// What the kernels are written with: loops over the lanes of plain arrays, of fixed length and without a branch, so that
+// compilers make one or two vector operations of every line. Sums stay in arrays of the function's own: nothing the
+// compiler must fear to be aliased. Everything is inlined into the entry points of each instruction set.
+#pragma once
+#include <cstdint>
+
+#include "surface/field_kernels.h"
+
+#if defined(__GNUC__)
+#define RILL_INLINED __attribute__((always_inline))  // of lambdas, too: they would not know the instruction set
+#else
+#define RILL_INLINED
+#endif
+#define RILL_INLINE inline RILL_INLINED
+
+namespace rill::surface::inner {
+
+RILL_INLINE float lesser(float a, float b) { return a < b ? a : b; }
+RILL_INLINE float greater(float a, float b) { return a > b ? a : b; }
+
+alignas(64) constexpr uint32_t bit_of_lane[lanes] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
+                                                    1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+
+/// Bits to a word. (A sum in one loop would not become vectors.)
+RILL_INLINE uint32_t word_of(uint32_t (&bit)[lanes]) {
+    for (uint32_t l = 0; l < 8; ++l) bit[l] |= bit[l + 8];
+    for (uint32_t l = 0; l < 4; ++l) bit[l] |= bit[l + 4];
+    return bit[0] | bit[1] | bit[2] | bit[3];
+}
+
+RILL_INLINE float least_of(const float* of) {
+    alignas(64) float value[lanes / 2];
+    for (uint32_t l = 0; l < 8; ++l) value[l] = lesser(of[l], of[l + 8]);
+    for (uint32_t l = 0; l < 4; ++l) value[l] = lesser(value[l], value[l + 4]);
+    return lesser(lesser(value[0], value[1]), lesser(value[2], value[3]));
+}
+RILL_INLINE float greatest_of(const float* of) {
+    alignas(64) float value[lanes / 2];
+    for (uint32_t l = 0; l < 8; ++l) value[l] = greater(of[l], of[l + 8]);
+    for (uint32_t l = 0; l < 4; ++l) value[l] = greater(value[l], value[l + 4]);
+    return greater(greater(value[0], value[1]), greater(value[2], value[3]));
+}
+
+}  // namespace rill::surface::inner

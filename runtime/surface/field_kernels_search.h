@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+// Through the bundles: which points reach a box, which lie near some of them, and the winding number of all. Sixteen are
+// asked at a time, from groups to bundles to points.
+#pragma once
+#include <cstring>
+
+#include "surface/bits.h"
+#include "surface/field.h"
+#include "surface/field_kernels_lanes.h"
+#include "surface/field_rules.h"
+
+namespace rill::surface::inner {
+
+/// Which of bundles [first, first + 16) touch the box.
+RILL_INLINE uint32_t touching(const Bundles& b, uint32_t first, const float lower[3], const float upper[3]) {
+    alignas(64) uint32_t bit[lanes];
+    const float *lx = b.lower[0] + first, *ly = b.lower[1] + first, *lz = b.lower[2] + first;
+    const float *ux = b.upper[0] + first, *uy = b.upper[1] + first, *uz = b.upper[2] + first;
+    for (uint32_t l = 0; l < lanes; ++l) {
+        const bool x = (lx[l] <= upper[0]) & (ux[l] >= lower[0]), y = (ly[l] <= upper[1]) & (uy[l] >= lower[1]);
+        const bool z = (lz[l] <= upper[2]) & (uz[l] >= lower[2]);
+        bit[l] = x & y & z ? bit_of_lane[l] : 0u;
+    }
+    return word_of(bit);
+}
+/// Work(first point) for the bundles that touch the box, ascending.
+template <typename Work>
+RILL_INLINE void for_touching(const Field& f, const float lower[3], const float upper[3], Work&& work) {
+    for (uint32_t g = 0; g < f.groups.count; g += lanes)
+        for (uint32_t groups = touching(f.groups, g, lower, upper); groups; groups &= groups - 1) {
+            const uint32_t b = lanes * (g + lowest_bit(groups));
+            for (uint32_t some = touching(f.bundles, b, lower, upper); some; some &= some - 1)
+                work(lanes * (b + lowest_bit(some)));
+        }
+}
+
+/// Which of sixteen points may have weight in the box; rows x y z, nx ny nz, 1/R². Interval arithmetic in the very order
+/// in which the kernels compute u²: no point with weight anywhere in the box is missed, not even by rounding.
+RILL_INLINE uint32_t reaching(const float* const point[7], uint32_t first, const float lower[3], const float upper[3]) {
+    const float *px = point[0] + first, *py = point[1] + first, *pz = point[2] + first;
+    const float *nx = point[3] + first, *ny = point[4] + first, *nz = point[5] + first, *inverse = point[6] + first;
+    alignas(64) uint32_t bit[lanes];
+    for (uint32_t l = 0; l < lanes; ++l) {
+        const float ax = lower[0] - px[l], ay = lower[1] - py[l], az = lower[2] - pz[l];
+        const float bx = upper[0] - px[l], by = upper[1] - py[l], bz = upper[2] - pz[l];
+        const float dx = greater(greater(ax, -bx), 0), dy = greater(greater(ay, -by), 0), dz = greater(greater(az, -bz), 0);
+        const float lx = nx[l] * ax, ly = ny[l] * ay, lz = nz[l] * az, hx = nx[l] * bx, hy = ny[l] * by, hz = nz[l] * bz;
+        const float low = lesser(lx, hx) + lesser(ly, hy) + lesser(lz, hz);
+        const float high = greater(lx, hx) + greater(ly, hy) + greater(lz, hz);
+        const float h = greater(greater(low, -high), 0);
+        const float u2 = (dx * dx + dy * dy + dz * dz + flatten * h * h) * inverse[l];
+        bit[l] = u2 < 1 ? bit_of_lane[l] : 0u;
+    }
+    return word_of(bit);
+}
+/// Appends those of n candidates, laid out in rows, that reach the box of a batch.
+RILL_INLINE uint32_t shortlist(const float* const row[7], const uint32_t* candidates, uint32_t n, const Batch& b,
+                               uint32_t* list, uint32_t found) {
+    const float lower[3] = {least_of(b.x), least_of(b.y), least_of(b.z)};
+    const float upper[3] = {greatest_of(b.x), greatest_of(b.y), greatest_of(b.z)};
+    for (uint32_t first = 0; first < n; first += lanes) {
+        const uint32_t known = n - first < lanes ? (1u << (n - first)) - 1 : ~0u;
+        for (uint32_t some = reaching(row, first, lower, upper) & known; some; some &= some - 1, ++found)
+            list[found < most_listed ? found : most_listed - 1] = candidates[first + lowest_bit(some)];
+    }
+    return found;
+}
+RILL_INLINE uint32_t gather(const Field& f, const float lower[3], const float upper[3], uint32_t* out, uint32_t capacity) {
+    const float* const rows[7] = {f.x, f.y, f.z, f.nx, f.ny, f.nz, f.steep};
+    uint32_t found = 0;
+    for_touching(f, lower, upper, [&](uint32_t first) RILL_INLINED {
+        for (uint32_t some = reaching(rows, first, lower, upper); some; some &= some - 1, ++found)
+            if (found < capacity) out[found] = first + lowest_bit(some);
+    });
+    return found;
+}
+
+/// About 1 / √x³, to half a percent, the same on every machine: a guess from the exponent and one Newton step.
+RILL_INLINE float inverse_cube_root_squared(float x) {
+    uint32_t bits;
+    float y;
+    std::memcpy(&bits, &x, sizeof(bits));
+    bits = 0x5f375a86u - (bits >> 1);
+    std::memcpy(&y, &bits, sizeof(y));
+    y = y * (1.5f - 0.5f * x * y * y);
+    return y * y * y;
+}
+
+/// The winding number of discs at one position.
+struct Winding {
+    float x, y, z;
+    alignas(64) float sum[lanes], nearest[lanes];
+
+    RILL_INLINE void add_points(const Field& f, uint32_t first) {
+        const float *px = f.x + first, *py = f.y + first, *pz = f.z + first, *area = f.area + first;
+        const float *nx = f.nx + first, *ny = f.ny + first, *nz = f.nz + first;
+        for (uint32_t l = 0; l < lanes; ++l) {
+            const float rx = px[l] - x, ry = py[l] - y, rz = pz[l] - z;
+            const float d2 = rx * rx + ry * ry + rz * rz + 1e-20f;
+            sum[l] += area[l] * (nx[l] * rx + ny[l] * ry + nz[l] * rz) * inverse_cube_root_squared(d2);
+            nearest[l] = lesser(d2, nearest[l]);
+        }
+    }
+    /// Adds those of sixteen bundles that are far away; which are not?
+    RILL_INLINE uint32_t add_afar(const Bundles& b, uint32_t first) {
+        const float *cx = b.x + first, *cy = b.y + first, *cz = b.z + first, *limit = b.limit + first;
+        const float *ax = b.ax + first, *ay = b.ay + first, *az = b.az + first;
+        alignas(64) uint32_t near[lanes];
+        for (uint32_t l = 0; l < lanes; ++l) {
+            const float rx = cx[l] - x, ry = cy[l] - y, rz = cz[l] - z;
+            const float distance2 = rx * rx + ry * ry + rz * rz, d2 = distance2 + 1e-20f;
+            const float share = (ax[l] * rx + ay[l] * ry + az[l] * rz) * inverse_cube_root_squared(d2);
+            const float counted = distance2 < limit[l] ? 0.f : share, far2 = distance2 < limit[l] ? unsupported : d2;
+            sum[l] += counted, nearest[l] = lesser(far2, nearest[l]);
+            near[l] = distance2 < limit[l] ? bit_of_lane[l] : 0u;
+        }
+        return word_of(near);
+    }
+};
+
+/// Winding number of the points as oriented discs (Barill et al. 2018): about 1 in the liquid, 0 in the air. A sum of
+/// lane sums, always the same ones: the position alone decides it.
+RILL_INLINE float winding(const Field& f, float x, float y, float z, float& distance2) {
+    Winding w;
+    w.x = x, w.y = y, w.z = z;
+    for (uint32_t l = 0; l < lanes; ++l) w.sum[l] = 0, w.nearest[l] = unsupported;
+    for (uint32_t g = 0; g < f.groups.count; g += lanes)
+        for (uint32_t groups = w.add_afar(f.groups, g); groups; groups &= groups - 1) {
+            const uint32_t b = lanes * (g + lowest_bit(groups));
+            for (uint32_t near = w.add_afar(f.bundles, b); near; near &= near - 1)
+                w.add_points(f, lanes * (b + lowest_bit(near)));
+        }
+    for (uint32_t half = lanes / 2; half; half /= 2)
+        for (uint32_t l = 0; l < half; ++l)
+            w.sum[l] += w.sum[l + half], w.nearest[l] = lesser(w.nearest[l], w.nearest[l + half]);
+    distance2 = w.nearest[0];
+    return w.sum[0];
+}
+
+}  // namespace rill::surface::inner
