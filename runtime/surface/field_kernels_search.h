@@ -19,7 +19,7 @@ RILL_INLINE uint32_t touching(const Bundles& b, uint32_t first, const float lowe
     for (uint32_t l = 0; l < lanes; ++l) {
         const bool x = (lx[l] <= upper[0]) & (ux[l] >= lower[0]), y = (ly[l] <= upper[1]) & (uy[l] >= lower[1]);
         const bool z = (lz[l] <= upper[2]) & (uz[l] >= lower[2]);
-        bit[l] = x & y & z ? bit_of_lane[l] : 0u;
+        bit[l] = (x & y & z) ? bit_of_lane[l] : 0u;
     }
     return word_of(bit);
 }
