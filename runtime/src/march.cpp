@@ -91,6 +91,9 @@ void seed_drop(Mesher& m, uint32_t i) {
     }
 }
 
+/// Rounded down into 0 … most; no number at all is `most`: patches of a hostile asset reach anywhere.
+int within(float x, int most) { return int(std::max(0.f, std::min(float(most), x))); }
+
 /// Marks the cells of the tile that the disc of point i crosses, column by column along the axis its normal
 /// is nearest to. A guess is enough: the march finds what is missed. (Without a branch, three cells to a column, it takes
 /// half as many instructions again.)
@@ -107,10 +110,10 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
     int from[3], to[3], home[3];
     bool is_home = true;
     for (int a = 0; a < 3; ++a) {
-        from[a] = std::max(int(at[a] - radius + tile_cells) - tile_cells, 0);  // rounds down from −8 up
-        to[a] = std::min(int(at[a] + radius), tile_cells - 1);
+        from[a] = within(at[a] - radius, tile_cells);
+        to[a] = within(at[a] + radius, tile_cells - 1);
         is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
-        home[a] = std::clamp(int(at[a]), 0, tile_cells - 1);
+        home[a] = within(at[a], tile_cells - 1);
     }
     if (is_home) want(tile, home);
     const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
@@ -132,8 +135,8 @@ void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
             const float ru = float(cell[u]) + 0.5f - at[u];
             if (((1 + slope_u * slope_u) * ru + skew) * ru > nearest) continue;
             const float middle = height + (slope + uu * ru) * ru;
-            const int last = int(std::clamp(middle + half + 1, 0.f, 8.f)) - 1;  // rounds down from −1 up
-            cell[axis] = int(std::clamp(middle - half, 0.f, 8.f));
+            const int last = within(middle + half + 1, tile_cells) - 1;
+            cell[axis] = within(middle - half, tile_cells);
             for (; cell[axis] <= last; ++cell[axis]) want(tile, cell);
         }
     }
