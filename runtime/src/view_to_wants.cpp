@@ -10,7 +10,7 @@ namespace {
 
 constexpr float automatic_pixel_error = 2;  ///< Budget::pixel_error 0
 /// In cells: a layer that leaves so little wrong is fine enough. dam_break from 4 diagonals, cells of 2 pixels: with 1 cell the drawn
-/// surface was off by a p99 of 2.6 pixels for no fewer triangles; with .5 by less than a pixel from anywhere.
+/// surface was off by a p99 of 2.6 pixels for no fewer triangles; with .5 by about a pixel from anywhere.
 constexpr float most_error = 0.5f;
 constexpr float most_cells_across = 1 << 20;
 /// Cells stay as they are while an eye moves by no more than this share of its distance, and the sizes asked for
