@@ -49,9 +49,9 @@ private:
     std::unordered_map<uint64_t, std::vector<SurfacePoint>> cells_;
 };
 
-/// Half the spacing of the points around; 0 where one already stands close enough.
+/// Half the spacing of the points around, `widest` edges at most; 0 where one already stands close enough.
 float room_for(const SurfaceFrame& frame, const VertexTree& tree, const std::vector<SurfacePoint>& points,
-               const SurfacePoint& p) {
+               const SurfacePoint& p, float widest) {
     thread_local std::vector<VertexTree::Found> found;
     tree.nearest(p.position, 10, found);
     float nearest = 1e30f, third = coarsest * frame.edge / 0.6f;
@@ -65,7 +65,7 @@ float room_for(const SurfaceFrame& frame, const VertexTree& tree, const std::vec
             break;
         }
     }
-    const float room = std::max(0.6f * third, finest * frame.edge);
+    const float room = std::clamp(0.6f * third, finest * frame.edge, widest * frame.edge);
     return nearest < 0.75f * room ? 0.f : room;
 }
 
@@ -74,7 +74,7 @@ float room_for(const SurfaceFrame& frame, const VertexTree& tree, const std::vec
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual,
                                         const std::vector<SurfacePoint>& points, float threshold) {
     const auto badness = [&](uint32_t v) {
-        return residual.wrong_side[v] ? 4 * frame.edge : std::min(std::fabs(residual.distance[v]), 4 * frame.edge);
+        return residual.wrong_side[v] || residual.spur[v] ? 4 * frame.edge : std::min(std::fabs(residual.distance[v]), 4 * frame.edge);
     };
     std::vector<uint32_t> bad;
     for (uint32_t v = 0; v < residual.distance.size(); ++v)
@@ -91,7 +91,7 @@ std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residua
     for (uint32_t v : bad) {
         const glm::vec3 velocity = frame.mesh.velocities.empty() ? glm::vec3(0) : frame.mesh.velocities[v];
         const SurfacePoint p{frame.mesh.positions[v], frame.mesh.normals[v], velocity};
-        const float room = room_for(frame, tree, points, p);
+        const float room = room_for(frame, tree, points, p, residual.spur[v] ? finest : coarsest);
         if (room <= 0 || !disks.free(p, room)) continue;
         disks.add(p);
         born.push_back(p);

@@ -15,6 +15,7 @@ constexpr int most_rounds = 8;  // of births at one frame
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float mended = 2;                        // tolerances of error left by coding that bear a point
+constexpr float spur = 4;                          // tolerances that the decoded mesh may stand off the source
 constexpr float surplus_angle = 0.1f;              // radians
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
@@ -143,6 +144,7 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
         if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);
+        if (round == 0) mark_spurs(frame, sweep.points, spur * goal.tolerance, residual, goal.jobs);
         const size_t born = bear_tracks(window, sample, residual, sweep.points, goal, goal.tolerance);
         last = born * enough <= sweep.points.size() || round + 1 == most_rounds;
         if (born == 0) break;
@@ -158,7 +160,9 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
         std::vector<SurfacePoint> points = decoded_points(coded.decoded, s);
         for (size_t i = first; i < window.paths.size(); ++i)
             if (window.paths[i].alive(s)) points.push_back(window.paths[i].target(s));
-        const Residual residual = measure_residual(*window.frames[size_t(s)], points, goal.jobs);
+        const SurfaceFrame& frame = *window.frames[size_t(s)];
+        Residual residual = measure_residual(frame, points, goal.jobs);
+        mark_spurs(frame, points, spur * goal.tolerance, residual, goal.jobs);
         bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
     }
 }

@@ -58,10 +58,14 @@ struct Residual {
     std::vector<float> distance;         ///< signed, metres, per source vertex: positive where the source lies outside
                                          ///< the decoded surface; ±missing where nothing is decoded there
     std::vector<uint8_t> wrong_side;     ///< per source vertex: a probe on its normal decodes to the wrong side
+    std::vector<uint8_t> spur;           ///< per source vertex, by mark_spurs()
     std::vector<float> support;          ///< per input point: radius of its patch
 };
 inline constexpr float missing = 1e3f;
 Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, int jobs = 1);
+/// Marks the source vertices nearest to where the decoded mesh stands more than `beyond` metres off the source: fins and
+/// scraps between the probes, which only more points than the spacing around asks for will keep away.
+void mark_spurs(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, Residual& residual, int jobs);
 /// How far each point lies from what its neighbours alone would decode to: metres, and radians of the normal.
 struct Surplus {
     std::vector<float> distance, angle;

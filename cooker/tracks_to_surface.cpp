@@ -7,42 +7,10 @@
 
 #include "parallel.h"
 #include "pipeline.h"
-#include "surface/field.h"
+#include "points_to_mesh.h"
 
 namespace rill::cooker {
 namespace {
-
-/// The runtime's field over a vector of points, memory included.
-class PointField {
-public:
-    explicit PointField(const std::vector<SurfacePoint>& points, int jobs) {
-        const uint32_t n = uint32_t(points.size());
-        for (auto& row : rows_) row.resize(n);
-        for (uint32_t i = 0; i < n; ++i) {
-            for (int a = 0; a < 3; ++a) {
-                rows_[a][i] = points[i].position[a];
-                rows_[3 + a][i] = points[i].normal[a];
-                rows_[6 + a][i] = points[i].velocity[a];
-            }
-            rows_[9][i] = 1;
-        }
-        memory_.resize(surface::field_bytes(n, 0) + 64);
-        void* block = reinterpret_cast<void*>((reinterpret_cast<uintptr_t>(memory_.data()) + 63) & ~uintptr_t(63));
-        const format::PointSet set{n, rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), rows_[4].data(),
-                                   rows_[5].data(), rows_[6].data(), rows_[7].data(), rows_[8].data(), rows_[9].data()};
-        surface::begin_field(field, block, set, format::DropSet{});
-        constexpr uint32_t batch = 256;
-        parallel_for((field.point_count + batch - 1) / batch, jobs, [&](size_t part) {
-            surface::fit_patches(field, uint32_t(part) * batch, std::min(field.point_count, uint32_t(part + 1) * batch));
-        });
-        surface::finish_field(field);
-    }
-    surface::Field field;
-
-private:
-    std::vector<float> rows_[10];
-    std::vector<uint8_t> memory_;
-};
 
 /// Marks the vertices of a group whose probes are told to be on the wrong side.
 void ask_probes(const SurfaceFrame& frame, const surface::Field& field, uint32_t group, Residual& result) {
@@ -89,7 +57,7 @@ SurfacePoint Path::target(int sample) const {
 Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, int jobs) {
     Residual result;
     result.distance.assign(frame.mesh.positions.size(), missing);
-    result.wrong_side.assign(frame.mesh.positions.size(), 0);
+    result.wrong_side.assign(frame.mesh.positions.size(), 0), result.spur.assign(frame.mesh.positions.size(), 0);
     result.support.assign(points.size(), 0.f);
     if (points.empty()) return result;
     const PointField decoded(points, jobs);
@@ -117,6 +85,24 @@ Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePo
         ask_probes(frame, field, uint32_t(g), result);
     });
     return result;
+}
+
+void mark_spurs(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, Residual& residual, int jobs) {
+    if (frame.mesh.triangles.empty()) return;
+    const Mesh decoded = mesh_points(points, frame.edge, jobs);
+    std::vector<uint32_t> nearest(decoded.positions.size(), ~0u);
+    constexpr size_t batch = 1024;
+    parallel_for((nearest.size() + batch - 1) / batch, jobs, [&](size_t part) {
+        for (size_t i = part * batch; i < std::min(nearest.size(), (part + 1) * batch); ++i) {
+            const glm::vec3& x = decoded.positions[i];
+            if (frame.index.closest(x, beyond).distance < beyond) continue;
+            const SurfaceIndex::Hit source = frame.index.closest(x, INFINITY);
+            const glm::vec3& b = source.barycentric;
+            nearest[i] = frame.mesh.triangles[source.triangle][b.x >= b.y && b.x >= b.z ? 0 : b.y >= b.z ? 1 : 2];
+        }
+    });
+    for (uint32_t v : nearest)
+        if (v != ~0u) residual.spur[v] = 1;
 }
 
 Surplus measure_surplus(const std::vector<SurfacePoint>& points, int jobs) {

@@ -2,7 +2,7 @@
 // The mesher's memory and its table of stages. march.cpp finds the surface cells, drop_specks.cpp
 // clears noise from them, cells_to_vertices.cpp places their vertices, mesh_to_buffers.cpp joins them to
 // triangles in the caller's buffers.
-#include "field_to_mesh.h"
+#include "surface/field_to_mesh.h"
 
 #include <algorithm>
 #include <cstring>

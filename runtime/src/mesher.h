@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "cell_patches.h"
-#include "field_to_mesh.h"
+#include "surface/field_to_mesh.h"
 #include "surface/bits.h"
 
 namespace rill {

@@ -20,7 +20,7 @@
 
 #include "arena.h"
 #include "coefficients_to_points.h"
-#include "field_to_mesh.h"
+#include "surface/field_to_mesh.h"
 #include "format/check.h"
 #include "format/fourier_extension.h"
 #include "format/tracks.h"

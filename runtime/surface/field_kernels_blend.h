@@ -79,7 +79,8 @@ RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count,
 RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, float trusted_value, Batch& b) {
     alignas(64) float height[lanes], side[lanes] = {};
     alignas(64) float weight_a[lanes] = {}, sum_a[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {};
-    alignas(64) float voters[lanes] = {}, inside[lanes] = {};  // of A: how many, and the weight of those who say liquid
+    alignas(64) float voters[lanes] = {};                   // of A: how many
+    alignas(64) float all[lanes] = {}, inside[lanes] = {};  // weight of all, whichever way they face, and of who says liquid
     count = find_nearest(f, list, count, b, height);
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];
@@ -92,7 +93,8 @@ RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, floa
             const float wa = w * (gate * gate), wb = weight_b_of(u2, w, agree);
             weight_a[l] += wa, sum_a[l] += wa * g;
             weight_b[l] += wb, sum_b[l] += wb * g;
-            voters[l] += wa > 0 ? 1.f : 0.f, inside[l] += g < 0 ? wa : 0.f;
+            voters[l] += wa > 0 ? 1.f : 0.f;
+            all[l] += w, inside[l] += g < 0 ? w : 0.f;
         }
     }
     if (greatest_of(weight_b) > 0) find_side(f, list, count, b, height, side);
@@ -100,8 +102,8 @@ RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, floa
     for (uint32_t l = 0; l < lanes; ++l) {
         const float weight = weight_a[l], some_a = weight > 0 ? weight : 1.f, some_b = weight_b[l] > 0 ? weight_b[l] : 1.f;
         const float value_a = sum_a[l] / some_a, value_b = sum_b[l] / some_b, a = weight > 0 ? value_a : unsupported;
-        const float against = a < 0 ? weight - inside[l] : inside[l];
-        const float votes = against <= few_against * weight ? voters[l] : 0.f;
+        const float against = a < 0 ? all[l] - inside[l] : inside[l], few = a < 0 ? few_against : few_against_air;
+        const float votes = against <= few * all[l] ? voters[l] : 0.f;
         // Thin liquid: intersection, max; thin air: union, min.
         const float gain = side[l] < 0 ? value_b - a : a - value_b, better = weight > 0 ? gain : 1.f;
         const float take = weight_b[l] > 0 ? better : 0.f;
@@ -110,7 +112,7 @@ RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, floa
         const float size = value < 0 ? -value : value, u2 = b.u2[l];
         const float unsure = votes >= enough_voters ? 0.f : u2, uneasy = take > 0 ? u2 : unsure;
         const float asked = size > trusted_value ? uneasy : 0.f;
-        doubt[l] = asked > trusted ? bit_of_lane[l] : 0u;
+        doubt[l] = asked > (value < 0 ? trusted : trusted_air) ? bit_of_lane[l] : 0u;
         b.u2[l] = sign == 0 ? unsupported : u2;
     }
     return word_of(doubt);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Field → closed triangle mesh: dual contouring (Ju, Losasso, Schaefer & Warren 2002) marched from
 // the decoded points (Keeler & Bridson, section 1), one manifold vertex per surface patch of a cell.
+// The cooker meshes with it, too: where the decoded surface stands off the source, points are missing.
 #pragma once
 #include <cstddef>
 #include <cstdint>
 
-#include "levels.h"
-#include "relay.h"
 #include "rill/rill.h"
+#include "src/levels.h"
+#include "src/relay.h"
 #include "surface/field.h"
 
 namespace rill {

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+#include "points_to_mesh.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "parallel.h"
+#include "surface/field_to_mesh.h"
+
+namespace rill::cooker {
+namespace {
+
+void* aligned(std::vector<uint8_t>& memory, size_t bytes) {
+    if (memory.size() < bytes + 64) memory.resize(bytes + 64);
+    return reinterpret_cast<void*>((reinterpret_cast<uintptr_t>(memory.data()) + 63) & ~uintptr_t(63));
+}
+
+/// The stages of the mesher on as many threads as it has workers.
+void run_stages(Mesher* mesher, uint32_t workers) {
+    uint32_t count;
+    const Stage* stages = mesh_stages(&count);
+    for (const Stage* stage = stages; stage != stages + count; ++stage)
+        while (const uint32_t tasks = stage->prepare(mesher)) {
+            std::atomic<uint32_t> next{0};
+            if (stage->run)
+                parallel_for(workers, int(workers), [&](size_t worker) {
+                    for (uint32_t i; (i = next.fetch_add(1)) < tasks;) stage->run(mesher, i, uint32_t(worker));
+                });
+            if (!stage->repeats) break;
+        }
+}
+
+}  // namespace
+
+PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) {
+    const uint32_t n = uint32_t(points.size());
+    for (auto& row : rows_) row.resize(n);
+    for (uint32_t i = 0; i < n; ++i) {
+        for (int a = 0; a < 3; ++a) {
+            rows_[a][i] = points[i].position[a];
+            rows_[3 + a][i] = points[i].normal[a];
+            rows_[6 + a][i] = points[i].velocity[a];
+        }
+        rows_[9][i] = 1;
+    }
+    const format::PointSet set{n, rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), rows_[4].data(),
+                               rows_[5].data(), rows_[6].data(), rows_[7].data(), rows_[8].data(), rows_[9].data()};
+    surface::begin_field(field, aligned(memory_, surface::field_bytes(n, 0)), set, format::DropSet{});
+    constexpr uint32_t batch = 256;
+    parallel_for((field.point_count + batch - 1) / batch, jobs, [&](size_t part) {
+        surface::fit_patches(field, uint32_t(part) * batch, std::min(field.point_count, uint32_t(part + 1) * batch));
+    });
+    surface::finish_field(field);
+}
+
+Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs) {
+    const PointField decoded(points, jobs);
+    const uint32_t workers = uint32_t(threads_of(jobs));
+    std::vector<uint8_t> memory;
+    std::vector<uint32_t> indices;
+    Mesh mesh;
+    Target target{};
+    for (uint32_t vertices = 1u << 16;; vertices *= 2) {  // until it fits
+        const MeshLimits limits{vertices, 0, 0, workers};
+        Mesher* mesher = place_mesher(aligned(memory, mesher_bytes(limits)), limits);
+        mesh.positions.resize(vertices), indices.resize(size_t(vertices) * 8);
+        target.position = {mesh.positions.data(), sizeof(glm::vec3)};
+        target.indices = indices.data();
+        target.vertex_capacity = vertices, target.index_capacity = uint32_t(indices.size());
+        Levels levels{};
+        levels.cell_size = cell;
+        begin_mesh(mesher, {&decoded.field, levels, nullptr, 0, false, &target});
+        run_stages(mesher, workers);
+        if (!mesh_counts(mesher).cut || vertices == 1u << 26) break;
+    }
+    mesh.positions.resize(target.vertices_used);
+    for (uint32_t i = 0; i + 2 < target.indices_used; i += 3) mesh.triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    return mesh;
+}
+
+}  // namespace rill::cooker

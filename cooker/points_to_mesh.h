@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// What a set of points decodes to, as the runtime would draw it.
+#pragma once
+#include <vector>
+
+#include "mesh.h"
+#include "surface/field.h"
+#include "surface_frame.h"
+
+namespace rill::cooker {
+
+/// The runtime's field over a vector of points, memory included. Drops are left out.
+class PointField {
+public:
+    explicit PointField(const std::vector<SurfacePoint>& points, int jobs = 1);
+    PointField(const PointField&) = delete;
+    surface::Field field;
+
+private:
+    std::vector<float> rows_[10];
+    std::vector<uint8_t> memory_;
+};
+
+/// The runtime's mesh of the points, with cells of that size (metres): positions and triangles.
+Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs = 1);
+
+}  // namespace rill::cooker

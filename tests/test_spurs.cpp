@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// Decoded liquid that the source does not have: the cooker meshes what points decode to, finds it, and bears points there.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+
+#include "pipeline.h"
+#include "points_to_mesh.h"
+#include "shapes.h"
+#include "surface_distance.h"
+
+using namespace rill::cooker;
+
+namespace {
+
+constexpr float radius = 0.5f;
+
+/// Every vertex of a ball as a point.
+std::vector<SurfacePoint> points_of(uint32_t n, float r, const glm::vec3& centre = {}) {
+    std::vector<SurfacePoint> points;
+    for (const glm::vec3& x : sphere(n, r, centre).positions) points.push_back({x, glm::normalize(x - centre), {}});
+    return points;
+}
+SurfaceFrame frame_of_ball() {
+    Mesh mesh = sphere(64, radius);
+    const float edge = float(median_edge(mesh));
+    return SurfaceFrame(std::move(mesh), edge);
+}
+size_t count(const std::vector<uint8_t>& flags) { return size_t(std::count(flags.begin(), flags.end(), 1)); }
+
+}  // namespace
+
+TEST_CASE("points mesh to the closed surface they mean, the same with any number of threads") {
+    const std::vector<SurfacePoint> points = points_of(24, radius);
+    const Mesh mesh = mesh_points(points, 0.03f);
+    const Topology shape = topology(mesh);
+    CHECK(shape.open_edges == 0);
+    CHECK(shape.components == 1);
+    CHECK(shape.volume == doctest::Approx(4 / 3.0 * 3.14159265 * radius * radius * radius).epsilon(0.01));
+    for (const glm::vec3& x : mesh.positions) CHECK(glm::length(x) == doctest::Approx(radius).epsilon(0.01));
+    for (int jobs = 2; jobs <= 8; jobs *= 4) {
+        const Mesh other = mesh_points(points, 0.03f, jobs);
+        CHECK(other.positions == mesh.positions);
+        CHECK(other.triangles == mesh.triangles);
+    }
+    CHECK(mesh_points({}, 0.03f).positions.empty());
+}
+
+TEST_CASE("a mesh of more vertices than were made room for is whole") {
+    const Mesh mesh = mesh_points(points_of(24, radius), 0.004f);
+    CHECK(mesh.positions.size() > (1u << 16));
+    CHECK(topology(mesh).open_edges == 0);
+}
+
+TEST_CASE("decoded liquid that the source lacks marks the vertices nearest to it, and only those") {
+    const SurfaceFrame frame = frame_of_ball();
+    std::vector<SurfacePoint> points = points_of(24, radius);
+    Residual clean = measure_residual(frame, points);
+    mark_spurs(frame, points, frame.edge, clean, 2);
+    CHECK(count(clean.spur) == 0);
+
+    for (const SurfacePoint& p : points_of(12, 0.1f, {0, 0, radius + 0.3f})) points.push_back(p);
+    Residual spurred = measure_residual(frame, points);
+    mark_spurs(frame, points, frame.edge, spurred, 2);
+    CHECK(count(spurred.spur) > 0);
+    for (size_t v = 0; v < spurred.spur.size(); ++v)
+        if (spurred.spur[v]) CHECK(glm::distance(frame.mesh.positions[v], glm::vec3(0, 0, radius)) < 0.25f);
+}
+
+TEST_CASE("at a spur a point is born where others would stand too close") {
+    const SurfaceFrame frame = frame_of_ball();
+    const std::vector<SurfacePoint> points = points_of(14, radius);  // about five edges apart
+    // A vertex half way between points at the equator.
+    const glm::vec3 between = radius * glm::normalize(points[1 + 2 * 14].position + points[2 + 2 * 14].position);
+    uint32_t vertex = 0;
+    for (uint32_t v = 0; v < frame.mesh.positions.size(); ++v)
+        if (glm::distance(frame.mesh.positions[v], between) < glm::distance(frame.mesh.positions[vertex], between)) vertex = v;
+    Residual residual;
+    residual.distance.assign(frame.mesh.positions.size(), 0.f);
+    residual.wrong_side.assign(residual.distance.size(), 0), residual.spur = residual.wrong_side;
+    CHECK(choose_births(frame, residual, points, 0.1f * frame.edge).empty());
+    residual.wrong_side[vertex] = 1;
+    CHECK(choose_births(frame, residual, points, 0.1f * frame.edge).empty());
+    residual.spur[vertex] = 1;
+    const std::vector<SurfacePoint> born = choose_births(frame, residual, points, 0.1f * frame.edge);
+    REQUIRE(born.size() == 1);
+    CHECK(born[0].position == frame.mesh.positions[vertex]);
+}
