@@ -110,7 +110,7 @@ float spacing_at(const std::vector<SurfacePoint>& points, const VertexTree& tree
 size_t bear_tracks(Window& window, int sample, const Residual& residual, const std::vector<SurfacePoint>& points,
                    const WindowGoal& goal, float threshold) {
     const SurfaceFrame& frame = *window.frames[size_t(sample)];
-    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, threshold);
+    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, threshold, goal.tolerance);
     std::vector<SurfacePoint> all = points;
     all.insert(all.end(), births.begin(), births.end());
     std::vector<glm::vec3> positions;

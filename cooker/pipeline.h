@@ -77,9 +77,9 @@ Surplus measure_places(const std::vector<SurfacePoint>& points, const std::vecto
 double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction);
 
 /// New points where |residual| exceeds `threshold`: worst first, no two closer than half the spacing of the points
-/// that were measured.
+/// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to.
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual,
-                                        const std::vector<SurfacePoint>& points, float threshold);
+                                        const std::vector<SurfacePoint>& points, float threshold, float tolerance);
 
 /// Carries the point at samples[from] to the neighbouring frame; empty where the surface leaves it.
 std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const SurfaceFrame& to, float seconds,

@@ -79,11 +79,11 @@ TEST_CASE("at a spur a point is born where others would stand too close") {
     Residual residual;
     residual.distance.assign(frame.mesh.positions.size(), 0.f);
     residual.wrong_side.assign(residual.distance.size(), 0), residual.spur = residual.wrong_side;
-    CHECK(choose_births(frame, residual, points, 0.1f * frame.edge).empty());
+    CHECK(choose_births(frame, residual, points, 0.1f * frame.edge, 0.25f * frame.edge).empty());
     residual.wrong_side[vertex] = 1;
-    CHECK(choose_births(frame, residual, points, 0.1f * frame.edge).empty());
+    CHECK(choose_births(frame, residual, points, 0.1f * frame.edge, 0.25f * frame.edge).empty());
     residual.spur[vertex] = 1;
-    const std::vector<SurfacePoint> born = choose_births(frame, residual, points, 0.1f * frame.edge);
+    const std::vector<SurfacePoint> born = choose_births(frame, residual, points, 0.1f * frame.edge, 0.25f * frame.edge);
     REQUIRE(born.size() == 1);
     CHECK(born[0].position == frame.mesh.positions[vertex]);
 }
