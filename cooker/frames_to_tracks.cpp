@@ -154,8 +154,8 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
 /// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
 void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
     const size_t first = window.paths.size();
-    // At a border with the window before, births would pop: they fade in over the frame before.
-    for (int s = window.opens_span ? 0 : 1; s < window.samples(); ++s) {
+    // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
+    for (int s = 0; s < window.samples(); ++s) {
         if (s > 0) carry_on(window, s, goal.jobs, first);
         std::vector<SurfacePoint> points = decoded_points(coded.decoded, s);
         for (size_t i = first; i < window.paths.size(); ++i)
