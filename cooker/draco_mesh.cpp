@@ -3,6 +3,11 @@
 
 #include <draco/compression/decode.h>
 #include <draco/compression/encode.h>
+#include <draco/compression/point_cloud/point_cloud_decoder.h>
+#include <draco/core/varint_decoding.h>
+#include <draco/metadata/metadata_decoder.h>
+
+#include <algorithm>
 
 namespace rill::cooker {
 namespace {
@@ -25,8 +30,37 @@ std::vector<glm::vec3> get_vectors(const draco::Mesh& mesh, const draco::PointAt
     return values;
 }
 
+/// The largest of the counts that Draco makes room for before it has read what they count; 0 where it will refuse the file.
+uint32_t largest_count(const std::string& bytes) {
+    draco::DecoderBuffer buffer;
+    buffer.Init(bytes.data(), bytes.size());
+    draco::DracoHeader header;
+    if (!draco::PointCloudDecoder::DecodeHeader(&buffer, &header).ok() || header.encoder_type != draco::TRIANGULAR_MESH) return 0;
+    buffer.set_bitstream_version(DRACO_BITSTREAM_VERSION(header.version_major, header.version_minor));
+    draco::GeometryMetadata metadata;
+    if (header.flags & METADATA_FLAG_MASK && !draco::MetadataDecoder().DecodeGeometryMetadata(&buffer, &metadata)) return 0;
+    const bool edgebreaker = header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING;
+    const uint16_t version = buffer.bitstream_version();
+    uint8_t traversal;
+    if (edgebreaker && !buffer.Decode(&traversal)) return 0;
+    uint32_t largest = 0;
+    const bool fixed = version < DRACO_BITSTREAM_VERSION(2, edgebreaker ? 0 : 2);  // before: four bytes each
+    for (int counts = edgebreaker && version < DRACO_BITSTREAM_VERSION(2, 2) ? 3 : 2; counts > 0; --counts) {
+        uint32_t count;
+        if (!(fixed ? buffer.Decode(&count) : draco::DecodeVarint(&count, &buffer))) return 0;
+        largest = std::max(largest, count);
+    }
+    return largest;
+}
+
+/// Far more faces than Draco's best codes can describe in so many bytes.
+uint64_t most_faces_in(size_t bytes) { return 65536 + 1024 * uint64_t(bytes); }
+
 std::unique_ptr<draco::Mesh> decode_any(const std::string& bytes, const std::string& name) {
     try {
+        if (const uint32_t count = largest_count(bytes); count > most_faces_in(bytes.size()))
+            throw InputError(name + ": damaged Draco mesh: states " + std::to_string(count) + " faces or vertices in " +
+                             std::to_string(bytes.size()) + " bytes");
         draco::DecoderBuffer buffer;
         buffer.Init(bytes.data(), bytes.size());
         draco::Decoder decoder;
