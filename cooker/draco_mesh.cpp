@@ -40,12 +40,13 @@ uint32_t largest_count(const std::string& bytes) {
     draco::GeometryMetadata metadata;
     if (header.flags & METADATA_FLAG_MASK && !draco::MetadataDecoder().DecodeGeometryMetadata(&buffer, &metadata)) return 0;
     const bool edgebreaker = header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING;
+    constexpr uint16_t version_2_0 = 0x200, version_2_2 = 0x202;
     const uint16_t version = buffer.bitstream_version();
     uint8_t traversal;
     if (edgebreaker && !buffer.Decode(&traversal)) return 0;
     uint32_t largest = 0;
-    const bool fixed = version < DRACO_BITSTREAM_VERSION(2, edgebreaker ? 0 : 2);  // before: four bytes each
-    for (int counts = edgebreaker && version < DRACO_BITSTREAM_VERSION(2, 2) ? 3 : 2; counts > 0; --counts) {
+    const bool fixed = version < (edgebreaker ? version_2_0 : version_2_2);  // four bytes each
+    for (int counts = edgebreaker && version < version_2_2 ? 3 : 2; counts > 0; --counts) {
         uint32_t count;
         if (!(fixed ? buffer.Decode(&count) : draco::DecodeVarint(&count, &buffer))) return 0;
         largest = std::max(largest, count);
