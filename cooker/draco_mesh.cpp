@@ -38,7 +38,8 @@ uint32_t largest_count(const std::string& bytes) {
     if (!draco::PointCloudDecoder::DecodeHeader(&buffer, &header).ok() || header.encoder_type != draco::TRIANGULAR_MESH) return 0;
     buffer.set_bitstream_version(DRACO_BITSTREAM_VERSION(header.version_major, header.version_minor));
     draco::GeometryMetadata metadata;
-    if (header.flags & METADATA_FLAG_MASK && !draco::MetadataDecoder().DecodeGeometryMetadata(&buffer, &metadata)) return 0;
+    const bool has_metadata = buffer.bitstream_version() >= 0x103 && (header.flags & METADATA_FLAG_MASK);
+    if (has_metadata && !draco::MetadataDecoder().DecodeGeometryMetadata(&buffer, &metadata)) return 0;
     const bool edgebreaker = header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING;
     constexpr uint16_t version_2_0 = 0x200, version_2_2 = 0x202;
     const uint16_t version = buffer.bitstream_version();
