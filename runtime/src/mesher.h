@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "cell_patches.h"
-#include "surface/field_to_mesh.h"
 #include "surface/bits.h"
+#include "surface/field_to_mesh.h"
 
 namespace rill {
 

@@ -22,8 +22,8 @@ constexpr float flatten = 3;
 constexpr float core = 0.3f, trusted = 0.03f, trusted_air = 0.08f;
 // Nor is it asked where so many patches agree about the sign, but for a small share of the weight of all, whichever way
 // they face. (On a dam break it is asked at 22 of 100 positions farther than `trusted`, and overrules 95 of 100 of what it
-// would anywhere. With weights of the nearest one's face alone, .08 and 5 % for both: 13 and 80 of 100, and a third more
-// places where the mesh stands more than an edge off the source.)
+// would anywhere. With weights of the nearest one's face alone, .08 and 5 % for both: 13 and 80 of 100. What that leaves
+// standing off the source: cooker/README.md, "Spurs".)
 constexpr float enough_voters = 5, few_against = 0.01f, few_against_air = 0.05f;
 constexpr float sure = 0.2f, likely = 0.35f;  // of the winding number, from 0 or 1: to overrule within and beyond core
 constexpr float opposed = -0.2f;        // n·n0 below this: cluster B
