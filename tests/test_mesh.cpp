@@ -175,7 +175,8 @@ TEST_CASE("sphere at many cell sizes, also far from the origin and with cells ab
             if (cell > 0.3f) continue;  // clamped to their cells, vertices cannot all reach the surface
             const Error e = error(m, [&](const Vec& p) { return sphere(p - Vec{offset, offset, -offset}); });
             INFO("distance ", e.distance, " in cells ", e.distance / double(cell));
-            CHECK(e.distance < 2e-3 + 0.01 * double(cell));
+            // The mean of a patch's crossings lies up to cell²/4R deep; a step leaves a third of that.
+            CHECK(e.distance < 2e-3 + 0.01 * double(cell) + 0.1 * double(cell) * double(cell));
         }
     }
 }

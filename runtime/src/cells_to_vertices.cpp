@@ -13,6 +13,11 @@ namespace {
 
 constexpr float trusted_cells = 0.25f;    // patches and their crossings: farther apart, the patches may be wrong
 constexpr float cell_margin = 1 / 128.f;  // vertices keep off their cell's faces: no two coincide
+// A step takes the field to be at least so steep. Whole steps (0) go too far at rims, where the slope dwindles towards
+// the middle of the sheet, and the field itself, which goes through the source's vertices, is a little outside its
+// triangles. Bytes at equal p99, five clips of three scenes: 0 +3.6 %, 1 +2 %, 1.5 +.3 %; .7 of every step +1.8 %; the
+// cooker aiming at the middle of the triangles instead, with 1: +.3 … +1 %.
+constexpr float least_slope = 1.25f;
 
 uint32_t corner_signs(const Tile& tile, uint32_t cell) {
     const uint32_t x = cell % 8, row = cell / 8 % 8 + 9 * (cell / 64);
@@ -148,7 +153,7 @@ void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t pat
 /// One step onto the field, inside the cell. `i`: place in the batch.
 void step(MesherScratch& s, const Tile& tile, uint32_t i) {
     const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = tile.cell;
-    const float k = s.value[i] / g2;
+    const float k = s.value[i] / std::max(g2, least_slope * least_slope);
     if (!(k * k * g2 < size * size)) return;  // farther than a cell, or no field: stay
     const uint32_t cell = s.cell[s.slot[i]], at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     const float g[3] = {s.gx[i], s.gy[i], s.gz[i]};
