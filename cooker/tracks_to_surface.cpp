@@ -170,6 +170,9 @@ double residual_percentile(const SurfaceFrame& frame, const Residual& residual, 
 void correct_paths(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
                    const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths) {
     constexpr float reach = 0.6f;  // of the support
+    // Of every step: whole ones swing where supports overlap far, and spoil single frames. (Bytes at equal p99, all frames of
+    // dam_break / drop_splash: whole +4 %, half or .7 within 1 %; only the turns damped +2 %.)
+    constexpr float damping = 0.6f;
     std::vector<VertexTree::Found> found;
     for (size_t i = 0; i < points.size(); ++i) {
         const float support = residual.support[i];
@@ -195,8 +198,8 @@ void correct_paths(const SurfaceFrame& frame, const Residual& residual, const st
         Path& path = paths[ids[i]];
         const size_t k = size_t(sample - path.birth);
         const float limit = 0.3f * support;
-        path.correction[k] = std::clamp(path.correction[k] + float(mr - gx * mx - gy * my), -limit, limit);
-        path.tilt[k] = glm::clamp(path.tilt[k] - glm::vec2(float(gx), float(gy)), -0.5f, 0.5f);
+        path.correction[k] = std::clamp(path.correction[k] + damping * float(mr - gx * mx - gy * my), -limit, limit);
+        path.tilt[k] = glm::clamp(path.tilt[k] - damping * glm::vec2(float(gx), float(gy)), -0.5f, 0.5f);
     }
 }
 

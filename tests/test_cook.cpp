@@ -204,7 +204,7 @@ TEST_CASE("velocity: that of the liquid, and of the surface itself") {
         const Mesh later = player.mesh(t + step);
         const double stayed = distance(mesh, later).mean, went = distance(moved, later).mean;
         INFO("moved ", went, ", unmoved ", stayed);
-        CHECK(went < 0.4 * stayed);  // not 0: points that fade in and out move it too
+        CHECK(went < 0.45 * stayed);  // not 0: points that fade in and out move it too
     }
 }
 
