@@ -18,8 +18,8 @@ constexpr float support_scale = 1.4f;  // R, of the distance to the neighbour of
 constexpr float same_side = 0.3f;      // least n·n of a row
 constexpr float most_alone = 1.8f;     // support relative to that of the points of either side
 constexpr float most_apart = 2.2f;     // likewise to the distance of the 2nd nearest point: two or three points of a bubble
-                                       // or a tip must not reach farther than it is wide. (At 4.5 such patches open voids of
-                                       // 9 edges in solid liquid, and it takes 2.8 % more bytes at equal p99; 1.8 −1.4 %, but
+                                       // or a tip must not reach farther than it is wide. (At 4.5 such patches reach nine
+                                       // edges into solid liquid, and it takes 2.8 % more bytes at equal p99; 1.8 −1.4 %, but
                                        // then a smooth surface of few points stays a quarter above its target.)
 constexpr float most_area = 0.3f;      // of the squared distance to the 6th neighbour of either side, over π
 constexpr float most_bend = 0.9f;      // |curvature|·R at most: a patch never curls over
