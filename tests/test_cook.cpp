@@ -170,7 +170,7 @@ TEST_CASE("layers: closed from the first on, nearer with each, and cheap first")
         if (chunk.layer == 0) first += chunk.bytes;
         all += chunk.bytes;
     }
-    CHECK(first < 0.27 * double(all));  // an eighth, but for what a chunk of thirty tracks costs before its first
+    CHECK(first < 0.26 * double(all));  // an eighth, but for what a chunk of thirty tracks costs before its first
 }
 
 TEST_CASE("at a window's border nothing pops: either side is within the coding error of the same frame") {
@@ -204,7 +204,7 @@ TEST_CASE("velocity: that of the liquid, and of the surface itself") {
         const Mesh later = player.mesh(t + step);
         const double stayed = distance(mesh, later).mean, went = distance(moved, later).mean;
         INFO("moved ", went, ", unmoved ", stayed);
-        CHECK(went < 0.45 * stayed);  // not 0: points that fade in and out move it too
+        CHECK(went < 0.42 * stayed);  // not 0: points that fade in and out move it too
     }
 }
 
