@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Small closed pieces of liquid that are nearly ellipsoids, taken out of the meshes before points are scattered: one
-// track of an ellipsoid instead of a dozen of points, and rounder than so few points would make it.
+// Small closed pieces of liquid, or of air in it, that are nearly ellipsoids, taken out of the meshes before points are
+// scattered: one track of an ellipsoid instead of a dozen of points, and rounder than so few points would make it.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,7 @@ namespace rill::cooker {
 namespace {
 
 constexpr double most_volume = 100;     // cubic edges
+constexpr double least_air = 0.1;       // likewise: no cell shows less, yet points around it open a void
 constexpr float most_rms = 1.f;         // of the tolerance: of a piece's vertices from its ellipsoid
 constexpr float flattest = 0.12f;       // shortest over longest axis
 constexpr float reach = 2;              // edges that a drop may land off where its velocity takes it
@@ -31,22 +32,30 @@ struct Moments {
 
 Eigen::Vector3d eigen(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
-/// The ellipsoid of the same volume, centre and second moments, if the piece is one within `rms` metres.
-std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, float edge, float rms) {
-    const glm::vec3 base = mesh.positions[mesh.triangles[triangles.front()][0]];
+glm::vec3 base_of(const Mesh& mesh, const std::vector<uint32_t>& triangles) {
+    return mesh.positions[mesh.triangles[triangles.front()][0]];
+}
+Moments moments_of(const Mesh& mesh, const std::vector<uint32_t>& triangles) {
+    const glm::vec3 base = base_of(mesh, triangles);
     Moments m;
-    std::vector<uint32_t> vertices;
     for (uint32_t t : triangles) {
         const Triangle& v = mesh.triangles[t];
         m.add(eigen(mesh.positions[v[0]] - base), eigen(mesh.positions[v[1]] - base), eigen(mesh.positions[v[2]] - base));
-        vertices.insert(vertices.end(), v.begin(), v.end());
     }
-    if (!(m.volume > 0) || m.volume > most_volume * std::pow(double(edge), 3)) return {};
+    return m;
+}
+
+/// The ellipsoid of the same volume, centre and second moments, if the piece is one within `rms` metres.
+std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, const Moments& m, double most, float rms) {
+    if (!(std::abs(m.volume) > 0 && std::abs(m.volume) <= most)) return {};
+    const glm::vec3 base = base_of(mesh, triangles);
     const Eigen::Vector3d centre = m.first / m.volume;
     const Eigen::Matrix3d covariance = m.second / m.volume - centre * centre.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(5 * covariance);  // of a solid ellipsoid: S² / 5
     if (axes.info() != Eigen::Success || !(axes.eigenvalues()[0] > flattest * flattest * axes.eigenvalues()[2])) return {};
-    const Eigen::Matrix3d shape = axes.operatorSqrt(), inverse = axes.operatorInverseSqrt();
+    const Eigen::Matrix3d shape = (m.volume < 0 ? -1 : 1) * axes.operatorSqrt(), inverse = axes.operatorInverseSqrt();
+    std::vector<uint32_t> vertices;
+    for (uint32_t t : triangles) vertices.insert(vertices.end(), mesh.triangles[t].begin(), mesh.triangles[t].end());
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
     double sum = 0;
@@ -84,9 +93,17 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
         if (const uint32_t s = slot[piece[mesh.triangles[t][0]]]; s != ~0u) triangles[s].push_back(t);
     std::vector<Drop> drops;
     std::vector<bool> marked(mesh.positions.size(), false);
-    for (size_t s = 0; s < names.size(); ++s)
-        if (const auto drop = fit_drop(mesh, triangles[s], edge, most_rms * tolerance)) drops.push_back(*drop), marked[names[s]] = true;
-    if (drops.empty()) return drops;
+    const double cube = std::pow(double(edge), 3);
+    bool any = false;
+    for (size_t s = 0; s < names.size(); ++s) {
+        const Moments moments = moments_of(mesh, triangles[s]);
+        const auto drop = fit_drop(mesh, triangles[s], moments, most_volume * cube, most_rms * tolerance);
+        const bool nothing = moments.volume < 0 && moments.volume > -least_air * cube;
+        if (!drop && !nothing) continue;
+        if (!nothing) drops.push_back(*drop);
+        marked[names[s]] = any = true;
+    }
+    if (!any) return drops;
     std::vector<Triangle> others;
     for (const Triangle& t : mesh.triangles)
         if (!marked[piece[t[0]]]) others.push_back(t);

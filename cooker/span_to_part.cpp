@@ -18,6 +18,8 @@ namespace {
 constexpr int most_attempts = 3;
 constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
 constexpr double first_tolerance = 1.15;     // of the error aimed at
+constexpr double least_gain = 0.4;           // of the error's logarithm per that of the tolerance: crevices narrower than a
+                                             // cell stay, and points without end would not tell them
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
@@ -84,7 +86,7 @@ void SpanCook::run(uint32_t span, const std::string& output, const std::function
 SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
     const ChosenFrames judged(reader_, judged_frames_of(span));
     SpanResult kept;
-    double tolerance = first_tolerance * aim_.p99, best_miss = HUGE_VAL;
+    double tolerance = first_tolerance * aim_.p99, best_miss = HUGE_VAL, ratio_before = 0, tolerance_before = 0;
     for (int attempt = 1;; ++attempt) {
         SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
         result.measured = verify(candidate, judged, settings_.jobs).totals;
@@ -92,6 +94,9 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
         if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate, best);
         kept.attempts = attempt;
         if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) return kept;
+        if (attempt > 1 && ratio > 1 && tolerance < tolerance_before &&
+            std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
+        ratio_before = ratio, tolerance_before = tolerance;
         tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
     }
 }

@@ -49,13 +49,18 @@ Mesh scene(const glm::vec3& drop, const glm::vec3& velocity) {
 
 }  // namespace
 
-TEST_CASE("an ellipsoid becomes a drop, and only that") {
+TEST_CASE("an ellipsoid becomes a drop, air in liquid a bubble, and only they") {
     const glm::vec3 centre(2, 0.3f, -0.4f), velocity(1, 2, 3);
     Mesh mesh = scene(centre, velocity);
-    const size_t before = mesh.triangles.size(), own = ellipsoid(centre, velocity).triangles.size();
+    const size_t before = mesh.triangles.size();
+    const size_t own = ellipsoid(centre, velocity).triangles.size() + sphere(16, 0.1f, {0, 0, 0}).triangles.size();
     const std::vector<Drop> drops = take_drops(mesh, edge, 0.1f * edge);
-    REQUIRE(drops.size() == 1);
-    const Drop& drop = drops.front();
+    REQUIRE(drops.size() == 2);
+    const bool first = drops.front().volume > 0;
+    const Drop &drop = drops[first ? 0 : 1], &bubble = drops[first ? 1 : 0];
+    CHECK(glm::length(bubble.centre) < 1e-3f);
+    CHECK(bubble.volume < 0);
+    for (size_t k = 0; k < 6; ++k) CHECK(bubble.shape[k] == doctest::Approx(k < 3 ? -0.1 : 0).epsilon(0.03).scale(0.1));
     CHECK(glm::distance(drop.centre, centre) < 1e-3f);
     CHECK(glm::distance(drop.velocity, velocity) < 1e-4f);
     const float wanted[6] = {shape[0][0], shape[1][1], shape[2][2], shape[1][0], shape[2][0], shape[2][1]};
@@ -69,12 +74,22 @@ TEST_CASE("an ellipsoid becomes a drop, and only that") {
 
 TEST_CASE("with a wide tolerance the bumpy one is a drop as well; a mesh of drops alone leaves nothing") {
     Mesh mesh = scene({2, 0, 0}, {});
-    CHECK(take_drops(mesh, edge, edge).size() == 2);
+    CHECK(take_drops(mesh, edge, edge).size() == 3);
     Mesh alone = ellipsoid({}, {});
     CHECK(take_drops(alone, edge, edge).size() == 1);
     CHECK(alone.positions.empty());
     CHECK(alone.triangles.empty());
     CHECK(take_drops(alone, edge, edge).empty());
+}
+
+TEST_CASE("air that no cell shows is left out, liquid as small is not") {
+    const float radius = 0.2f * edge;
+    Mesh speck = sphere(8, radius, {0, 0, 0});
+    Mesh drop = speck;
+    CHECK(take_drops(drop, edge, 0.2f * edge).size() == 1);
+    for (Triangle& t : speck.triangles) std::swap(t[1], t[2]);
+    CHECK(take_drops(speck, edge, 0.2f * edge).empty());
+    CHECK(speck.triangles.empty());
 }
 
 TEST_CASE("drops are tracked through what they meet: two cross, one comes and goes") {

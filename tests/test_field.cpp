@@ -485,6 +485,24 @@ TEST_CASE("drop: an ellipsoid, turned and moving") {
     CHECK(std::fabs(evaluate(fading.field, Vec{1, 2, 3 + 0.1 * std::cbrt(0.5)}).value) < 1e-6);
 }
 
+TEST_CASE("bubble: takes liquid away, and a drop may fly in it") {
+    Cloud cloud;
+    add(cloud, sphere_of(1), 0.15);
+    cloud.add_drop({0.1, 0, 0}, {-0.3, -0.2, -0.25});
+    cloud.add_drop({0.1, 0, 0}, {0.05, 0.05, 0.05});
+    cloud.add_drop({5, 0, 0}, {-0.3, -0.3, -0.3});  // of nothing
+    const RealField real(cloud);
+    REQUIRE(real.field.drop_count == 3);
+    const Value on = evaluate(real.field, Vec{0.4, 0, 0}), inside = evaluate(real.field, Vec{0.25, 0, 0});
+    CHECK(std::fabs(on.value) < 1e-6);
+    CHECK(on.gradient[0] < -0.8);  // outward is into the bubble
+    CHECK(inside.value > 0);
+    CHECK(evaluate(real.field, Vec{0.5, 0, 0}).value < 0);
+    CHECK(evaluate(real.field, Vec{0.1, 0.02, 0}).value < 0);  // the drop
+    CHECK(evaluate(real.field, Vec{5, 0, 0}).value > 0);
+    CHECK(std::fabs(evaluate(real.field, Vec{0, 1, 0}).value) < 0.01);
+}
+
 TEST_CASE("fading: the surface moves smoothly while a point comes and goes") {
     const double h = 0.15;
     Cloud cloud;

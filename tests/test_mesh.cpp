@@ -236,6 +236,17 @@ TEST_CASE("drops: ellipsoids without a single point") {
     CHECK(volume(m) == doctest::Approx(4 * pi / 3 * (0.006 + 0.001)).epsilon(0.02));
 }
 
+TEST_CASE("a bubble in a ball: a second surface that faces inward") {
+    Cloud cloud = sphere_cloud(600);
+    cloud.add_drop({0.31, 0.02, 0.13}, {-0.2, -0.3, -0.1});
+    const RealField real(cloud);
+    const Mesh m = mesh(real.field, {.cell = 0.03f});
+    const Topology t = topology(m);
+    CHECK(t.closed_manifold());
+    CHECK(t.euler == 4);
+    CHECK(volume(m) == doctest::Approx(4 * pi / 3 * (1 - 0.006)).epsilon(0.004));
+}
+
 TEST_CASE("random signs: always a closed 2-manifold") {
     HandField hand;
     for (int z = grid_from; z < grid_to; ++z)

@@ -4,7 +4,8 @@
 //
 // A *point track* is a surface point (position + unit normal) over part of a window.
 // A *drop track* is a small closed component: an ellipsoid (centre + symmetric shape matrix S),
-// surface = { centre + S u : |u| = 1 }. It costs one track where points would need a dozen.
+// surface = { centre + S u : |u| = 1 }. It costs one track where points would need a dozen. S is positive definite for a
+// drop of liquid, negative definite for a bubble: air that it takes out of the liquid around.
 //
 // Time inside a window is measured in samples: s = 0 is its first frame, s = sample_count − 1 its
 // last. A track lives on the closed range [birth, death] of samples. Its channels are

@@ -198,7 +198,8 @@ void widen_bundles(Field& f) {
     });
 }
 
-/// Ellipsoid {c + S u}: stores S⁻¹, so that |S⁻¹ r| = 1 on the surface. A flat or broken S is skipped.
+/// Ellipsoid {c + S u}: stores S⁻¹, so that |S⁻¹ r| = 1 on the surface. A flat, indefinite or broken S is skipped. That of a
+/// bubble is negative: so is its radius then, which turns the field over.
 void place_drops(Field& f, const format::DropSet& drops) {
     f.drop_count = 0;
     for (uint32_t i = 0; i < drops.count; ++i) {
@@ -208,7 +209,8 @@ void place_drops(Field& f, const format::DropSet& drops) {
         const float c0 = yy * zz - yz * yz, c1 = xz * yz - xy * zz, c2 = xy * yz - yy * xz;
         const float determinant = xx * c0 + xy * c1 + xz * c2;
         const float size = std::sqrt(xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz));
-        if (!(determinant > 1e-4f * size * size * size) || !std::isfinite(determinant) ||
+        const bool definite = xx * yy > xy * xy && xx * determinant > 0;
+        if (!definite || !(std::fabs(determinant) > 1e-4f * size * size * size) || !std::isfinite(determinant) ||
             !std::isfinite(drops.x[i] + drops.y[i] + drops.z[i]) || !(drops.activity[i] > 0)) continue;
         const uint32_t at = f.drop_count++;
         const float k = 1 / determinant;

@@ -55,7 +55,7 @@ struct Field {
     float* area;                           ///< that the point stands for, over 4π, for the winding number
     float *vx, *vy, *vz;
     uint32_t* source;                      ///< index in the PointSet each came from
-    // Drops as they came, with inverse shape and mean radius.
+    // Drops as they came, with inverse shape and mean radius, negative for bubbles.
     float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
     Bundles bundles, groups;               ///< of points; of bundles
     float spacing;                         ///< about the distance of points

@@ -66,30 +66,37 @@ void settle(const Field& f, const Batch& b, uint32_t l, uint32_t i, const Result
         if (row) row[i] = 0;
 }
 
+/// Where ellipsoid d says more than what stands there: a bubble takes liquid away, a drop adds it.
+void add_drop(const Field& f, uint32_t d, const float* x, const float* y, const float* z, uint32_t n, const Results& out) {
+    const float xx = f.inverse[0][d], yy = f.inverse[1][d], zz = f.inverse[2][d], xy = f.inverse[3][d],
+                xz = f.inverse[4][d], yz = f.inverse[5][d];
+    const bool bubble = f.radius[d] < 0;
+    for (uint32_t i = 0; i < n; ++i) {
+        const float rx = x[i] - f.dx[d], ry = y[i] - f.dy[d], rz = z[i] - f.dz[d];
+        // gather() knows no drop beyond its reach: the box asked for must not matter.
+        if (rx * rx + ry * ry + rz * rz >= f.reach[d] * f.reach[d]) continue;
+        const float ex = xx * rx + xy * ry + xz * rz, ey = xy * rx + yy * ry + yz * rz, ez = xz * rx + yz * ry + zz * rz;
+        const float length = std::sqrt(ex * ex + ey * ey + ez * ez);
+        const float g = (length - 1) * f.radius[d];
+        if (bubble ? g <= out.value[i] : g >= out.value[i]) continue;
+        out.value[i] = g;
+        if (!out.gx) continue;
+        const float k = f.radius[d] / std::max(length, 1e-6f);
+        out.gx[i] = k * (xx * ex + xy * ey + xz * ez);
+        out.gy[i] = k * (xy * ex + yy * ey + yz * ez);
+        out.gz[i] = k * (xz * ex + yz * ey + zz * ez);
+        if (out.vx) out.vx[i] = f.dvx[d], out.vy[i] = f.dvy[d], out.vz[i] = f.dvz[d];
+    }
+}
+
+/// Bubbles before drops: a drop may fly inside a bubble.
 void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const float* x, const float* y,
                const float* z, uint32_t n, const Results& out) {
-    for (uint32_t c = 0; c < count; ++c) {
-        const uint32_t d = candidates[c] - f.point_count;
-        const float xx = f.inverse[0][d], yy = f.inverse[1][d], zz = f.inverse[2][d], xy = f.inverse[3][d],
-                    xz = f.inverse[4][d], yz = f.inverse[5][d];
-        for (uint32_t i = 0; i < n; ++i) {
-            const float rx = x[i] - f.dx[d], ry = y[i] - f.dy[d], rz = z[i] - f.dz[d];
-            // gather() knows no drop beyond its reach: the box asked for must not matter.
-            if (rx * rx + ry * ry + rz * rz >= f.reach[d] * f.reach[d]) continue;
-            const float ex = xx * rx + xy * ry + xz * rz, ey = xy * rx + yy * ry + yz * rz,
-                        ez = xz * rx + yz * ry + zz * rz;
-            const float length = std::sqrt(ex * ex + ey * ey + ez * ez);
-            const float g = (length - 1) * f.radius[d];
-            if (g >= out.value[i]) continue;
-            out.value[i] = g;
-            if (!out.gx) continue;
-            const float k = f.radius[d] / std::max(length, 1e-6f);
-            out.gx[i] = k * (xx * ex + xy * ey + xz * ez);
-            out.gy[i] = k * (xy * ex + yy * ey + yz * ez);
-            out.gz[i] = k * (xz * ex + yz * ey + zz * ez);
-            if (out.vx) out.vx[i] = f.dvx[d], out.vy[i] = f.dvy[d], out.vz[i] = f.dvz[d];
+    for (const bool bubbles : {true, false})
+        for (uint32_t c = 0; c < count; ++c) {
+            const uint32_t d = candidates[c] - f.point_count;
+            if ((f.radius[d] < 0) == bubbles) add_drop(f, d, x, y, z, n, out);
         }
-    }
 }
 
 /// The first position fills unused lanes: no branch in the kernels.
