@@ -12,6 +12,7 @@ namespace {
 
 constexpr double most_volume = 100;     // cubic edges
 constexpr double least_air = 0.1;       // likewise: no cell shows less, yet points around it open a void
+constexpr double most_open = 0.01;      // of the area: |∫ n| of a piece that counts as closed
 constexpr float most_rms = 1.f;         // of the tolerance: of a piece's vertices from its ellipsoid
 constexpr float flattest = 0.12f;       // shortest over longest axis
 constexpr float reach = 2;              // edges that a drop may land off where its velocity takes it
@@ -19,12 +20,15 @@ constexpr float most_growth = 2;        // of volume from frame to frame, either
 
 /// Volume integrals of a closed piece, about `base`: 1, x, x xᵀ.
 struct Moments {
-    double volume = 0;
+    double volume = 0, area = 0;
+    Eigen::Vector3d facing = Eigen::Vector3d::Zero();  ///< ∫ n: nothing, of a closed piece
     Eigen::Vector3d first = Eigen::Vector3d::Zero();
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
     void add(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
         const double six = a.dot(b.cross(c));
         const Eigen::Vector3d sum = a + b + c;
+        const Eigen::Vector3d twice = (b - a).cross(c - a);
+        area += twice.norm() / 2, facing += twice / 2;
         volume += six / 6, first += six / 24 * sum;
         second += six / 120 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
     }
@@ -97,6 +101,7 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
     bool any = false;
     for (size_t s = 0; s < names.size(); ++s) {
         const Moments moments = moments_of(mesh, triangles[s]);
+        if (moments.facing.norm() > most_open * moments.area) continue;  // a scrap of a sheet: what volume it has means nothing
         const auto drop = fit_drop(mesh, triangles[s], moments, most_volume * cube, most_rms * tolerance);
         const bool nothing = moments.volume < 0 && moments.volume > -least_air * cube;
         if (!drop && !nothing) continue;

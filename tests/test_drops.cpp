@@ -90,6 +90,9 @@ TEST_CASE("air that no cell shows is left out, liquid as small is not") {
     for (Triangle& t : speck.triangles) std::swap(t[1], t[2]);
     CHECK(take_drops(speck, edge, 0.2f * edge).empty());
     CHECK(speck.triangles.empty());
+    Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 2e-5f}}, {}, {}, {{0, 1, 2}, {1, 3, 2}}};  // open: no air, whatever its volume
+    CHECK(take_drops(sheet, edge, edge).empty());
+    CHECK(sheet.triangles.size() == 2);
 }
 
 TEST_CASE("drops are tracked through what they meet: two cross, one comes and goes") {
