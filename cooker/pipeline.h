@@ -48,7 +48,8 @@ struct Window {
     int samples() const { return int(frames.size()); }
 };
 
-/// Takes the pieces that are ellipsoids within the tolerance (metres) out of a mesh.
+/// Takes the closed pieces, of liquid or air, that are ellipsoids within the tolerance (metres) out of a mesh; and air too
+/// little to show, which is in no drop.
 std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance);
 /// Their tracks over the window. Those at its first and last sample go on in the windows beside it, which see the same frame.
 std::vector<TrackSamples> track_drops(const Window& window);

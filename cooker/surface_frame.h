@@ -32,11 +32,11 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// A small closed piece of liquid, as the ellipsoid {centre + S u : |u| = 1}.
+/// A small closed piece of liquid, or of air in it, as the ellipsoid {centre + S u : |u| = 1}.
 struct Drop {
     glm::vec3 centre{}, velocity{};
-    std::array<float, 6> shape{};   ///< S: xx yy zz xy xz yz, metres
-    float volume = 0;               ///< m³
+    std::array<float, 6> shape{};   ///< S: xx yy zz xy xz yz, metres; negative definite: air
+    float volume = 0;               ///< m³; negative: air
 };
 
 /// Places beside the surface whose side is known: where the decoded surface must not be.
