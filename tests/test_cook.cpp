@@ -79,7 +79,7 @@ struct Cooked {
 
     explicit Cooked(const std::function<Mesh(int)>& frame, int count = frames) {
         for (int i = 0; i < count; ++i) put_file(input + "/f" + std::to_string(first_frame + i) + ".ply", plain_ply(frame(i)));
-        settings.error = "0.3e", settings.window = 3, settings.jobs = 2, settings.layers = 3;
+        settings.error = "0.15e", settings.window = 3, settings.jobs = 2, settings.layers = 3;
     }
     Cooked& cook() {
         report = rill::cooker::cook(input, asset, settings, [](const CookProgress&) {});

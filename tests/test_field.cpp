@@ -458,6 +458,30 @@ TEST_CASE("gradient: what finite differences of the value say") {
     CHECK(worst < 0.01);
 }
 
+TEST_CASE("gradient: of points that do not lie quite right, nearer to the true normals than the slope of the value") {
+    const double step = 1e-3;
+    Random random(5);
+    Cloud cloud;
+    for (const Sample& s : poisson_disk(torus_of(1, 0.4), 0.08, 1))
+        cloud.add(s.position + 0.002 * (2 * random() - 1) * s.normal, s.normal);
+    const RealField real(cloud);
+    double angle = 0, slope_angle = 0;
+    for (int i = 0; i < 500; ++i) {
+        const Sample s = torus_of(1, 0.4)(random);
+        const Value at = evaluate(real.field, s.position);
+        Vec slope{};
+        for (size_t a = 0; a < 3; ++a) {
+            Vec more = s.position, less = s.position;
+            more[a] += step, less[a] -= step;
+            slope[a] = evaluate(real.field, more).value - evaluate(real.field, less).value;
+        }
+        angle += std::acos(std::min(dot({at.gradient[0], at.gradient[1], at.gradient[2]}, s.normal) / at.steepness(), 1.0));
+        slope_angle += std::acos(std::min(dot(slope, s.normal) / length(slope), 1.0));
+    }
+    INFO(angle, " ", slope_angle);
+    CHECK(angle < 0.9 * slope_angle);
+}
+
 TEST_CASE("drop: an ellipsoid, turned and moving") {
     Cloud cloud;
     cloud.add_drop({1, 2, 3}, {0.3, 0.2, 0.1});

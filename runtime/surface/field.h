@@ -87,8 +87,8 @@ uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capa
 inline constexpr float unsupported = 1e30f;
 void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
               const float* x, const float* y, const float* z, uint32_t n, float* value) noexcept;
-/// The same with gradient (not normalised) and, if velocity is not null, the blended velocity of the
-/// surface (3n floats, SoA in three rows of n).
+/// The same with gradient (not normalised, and smoother than the value's own: `ripple` of field_rules.h) and, if
+/// velocity is not null, the blended velocity of the surface (3n floats, SoA in three rows of n).
 void evaluate_gradient(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
                        const float* x, const float* y, const float* z, uint32_t n, float* value,
                        float* gx, float* gy, float* gz, float* velocity) noexcept;

@@ -118,14 +118,14 @@ RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, floa
     return word_of(doubt);
 }
 
-/// Of the chosen cluster: Σ w ∇G + (G − value) ∇w, and Σ w v.
+/// Of the chosen cluster: Σ w ∇G + ripple (G − value) ∇w, and Σ w v.
 RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, bool velocity, Slopes& out) {
     alignas(64) float gx[lanes] = {}, gy[lanes] = {}, gz[lanes] = {}, vx[lanes] = {}, vy[lanes] = {}, vz[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = list[c];
         const Patch p = f.patches[j];
         const float mx = velocity ? f.vx[j] : 0, my = velocity ? f.vy[j] : 0, mz = velocity ? f.vz[j] : 0;
-        const float xx = 2 * p.xx, yy = 2 * p.yy, zz = 2 * p.zz, steep = 4 * p.inverse;
+        const float xx = 2 * p.xx, yy = 2 * p.yy, zz = 2 * p.zz, steep = 4 * ripple * p.inverse;
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
             const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
