@@ -15,6 +15,7 @@ constexpr int most_rounds = 8;  // of births at one frame
 constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float mended = 2;                        // tolerances of error left by coding that bear a point
+constexpr double spoilt = 1.7;                     // tolerances of a frame's 99th percentile that are mended in the end
 constexpr float spur = 4;                          // tolerances that the decoded mesh may stand off the source
 constexpr float surplus_angle = 0.1f;              // radians
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
@@ -151,8 +152,9 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
     }
 }
 
-/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears. Of frames whose 99th
+/// percentile is farther off than `least` tolerances.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, double least) {
     const size_t first = window.paths.size();
     // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
     for (int s = 0; s < window.samples(); ++s) {
@@ -162,6 +164,7 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
             if (window.paths[i].alive(s)) points.push_back(window.paths[i].target(s));
         const SurfaceFrame& frame = *window.frames[size_t(s)];
         Residual residual = measure_residual(frame, points, goal.jobs);
+        if (residual_percentile(frame, residual, 0.99) < least * goal.tolerance) continue;
         mark_spurs(frame, points, spur * goal.tolerance, residual, goal.jobs);
         bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
     }
@@ -207,18 +210,21 @@ void grow_tracks(Window& window, const std::vector<Path>& survivors, const Windo
 
 CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables) {
     CodedWindow coded;
-    for (int round = 0;; ++round) {
+    const auto code = [&](size_t first) {
         coded.tracks.resize(window.paths.size()), coded.decoded.resize(window.paths.size());
-        parallel_for(window.paths.size(), goal.jobs, [&](size_t i) {
+        parallel_for(window.paths.size() - first, goal.jobs, [&](size_t k) {
+            const size_t i = first + k;
             const Path& path = window.paths[i];
             coded.tracks[i] = quantise_track(samples_of(window, path), goal.quantiser, goal.origin, tables,
-                                             [&](uint32_t k, const glm::vec3& x, const glm::vec3& axis) {
-                                                 return project(window, path, path.birth + int(k), x, axis);
+                                             [&](uint32_t sample, const glm::vec3& x, const glm::vec3& axis) {
+                                                 return project(window, path, path.birth + int(sample), x, axis);
                                              });
             coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
         });
-        if (round == coding_rounds) break;
-        if (round == 0) mend(window, coded, goal);
+    };
+    code(0);
+    mend(window, coded, goal, 0);
+    for (int round = 0; round < coding_rounds; ++round) {
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
             const SurfaceFrame& frame = *window.frames[s];
             std::vector<uint32_t> ids;
@@ -226,7 +232,12 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
             const Residual residual = measure_residual(frame, points);
             correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
         });
+        code(0);
     }
+    // Now and then a correction spoils a frame.
+    const size_t whole = window.paths.size();
+    mend(window, coded, goal, spoilt);
+    code(whole);
     for (const TrackSamples& drop : track_drops(window)) {
         coded.tracks.push_back(quantise_track(drop, goal.quantiser, goal.origin, tables));
         coded.decoded.push_back(dequantise_track(coded.tracks.back(), goal.quantiser, goal.origin, tables));
