@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 #include <vector>
 
 #include "mesh_harness.h"
@@ -234,6 +235,34 @@ TEST_CASE("drops: ellipsoids without a single point") {
     CHECK(t.closed_manifold());
     CHECK(t.euler == 4);
     CHECK(volume(m) == doctest::Approx(4 * pi / 3 * (0.006 + 0.001)).epsilon(0.02));
+}
+
+TEST_CASE("drops and bubbles smaller than a cell: shown wherever they are, at their size") {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> any(-0.3, 0.3);
+    for (int i = 0; i < 200; ++i) {
+        CAPTURE(i);
+        const Vec at = {any(random), any(random), any(random)};
+        Cloud cloud = sphere_cloud(600);
+        cloud.add_drop(at, {-0.02, -0.02, -0.025});
+        cloud.add_drop(at + Vec{2, 0, 0}, {0.03, 0.02, 0.02});
+        const RealField real(cloud);
+        const Mesh m = mesh(real.field, {.cell = 0.06f});
+        const Topology t = topology(m);
+        CHECK(t.closed_manifold());
+        CHECK(t.euler == 6);
+        // Each is there, within a cell of its place, and no larger than it is.
+        for (const Vec& centre : {at, at + Vec{2, 0, 0}}) {
+            double farthest = 0;
+            int near = 0;
+            for (uint32_t v = 0; v < m.vertex_count(); ++v) {
+                const double d = length(m.at(v) - centre);
+                if (d < 0.2) ++near, farthest = std::max(farthest, d);
+            }
+            CHECK(near >= 8);
+            CHECK(farthest < 0.06 + 0.03);
+        }
+    }
 }
 
 TEST_CASE("a bubble in a ball: a second surface that faces inward") {

@@ -68,8 +68,33 @@ void seed_point(Mesher& m, uint32_t i) {
             for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) seed_box(m, disc, disc.level, c);
 }
 
+/// A drop that no corner of its cell lies in would not be seen, or come and go as it flies: it moves onto the nearest one.
+void show_drop(const Mesher& m, uint32_t i) {
+    constexpr float least = 0.2f, share = 0.5f;  // radius, of a cell: seen at all; where in the drop the corner lies then
+    const surface::Field& f = *m.input.field;
+    const float centre[3] = {f.dx[i], f.dy[i], f.dz[i]};
+    int32_t level, tile_coord[3];
+    if (!leaf_at(m, centre, level, tile_coord)) return;
+    const float cell = m.input.levels.cell(level);
+    if (!(std::abs(f.radius[i]) > least * cell)) return;
+    float nearest = surface::unsupported, away[3] = {};
+    for (int k = 0; k < 8; ++k) {
+        float r[3];
+        for (int a = 0; a < 3; ++a) r[a] = (std::floor(centre[a] / cell) + float(k >> a & 1)) * cell - centre[a];
+        const float x = f.inverse[0][i] * r[0] + f.inverse[3][i] * r[1] + f.inverse[4][i] * r[2];
+        const float y = f.inverse[3][i] * r[0] + f.inverse[1][i] * r[1] + f.inverse[5][i] * r[2];
+        const float z = f.inverse[4][i] * r[0] + f.inverse[5][i] * r[1] + f.inverse[2][i] * r[2];
+        const float length = std::sqrt(x * x + y * y + z * z);
+        if (length < nearest) nearest = length, std::copy(r, r + 3, away);
+    }
+    if (!(nearest > 1 - 1e-3f)) return;
+    float* const place[3] = {f.dx + i, f.dy + i, f.dz + i};
+    for (int a = 0; a < 3; ++a) *place[a] += away[a] * (1 - share / nearest);
+}
+
 /// The cells where the six half axes leave the ellipsoid; it is convex, so the march finds the rest.
 void seed_drop(Mesher& m, uint32_t i) {
+    show_drop(m, i);
     const surface::Field& f = *m.input.field;
     constexpr int row[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
     for (int a = 0; a < 6; ++a) {

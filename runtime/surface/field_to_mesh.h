@@ -23,7 +23,8 @@ struct FrustumPlanes {
     float planes[6][4];  ///< asset space, inward
 };
 struct MeshInput {
-    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares
+    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares; its drops are moved
+                                  ///< by up to a cell where none would show them
     Levels levels;                ///< sizes of cells
     const FrustumPlanes* views;   ///< none: everything
     uint32_t view_count;
