@@ -3,7 +3,7 @@
 //   rows      weighted by distance, only neighbours that face the same way
 //   support   follows the local spacing (distance to the 6th neighbour of the same side)
 //   curvature clamped, so that a degenerate neighbourhood gives a flat patch and never a spike; at 1.8 / R
-//             (at .45, .9 and 1.3 honest fillets and drops cost 10, 3 and 1 % more bytes at equal error; 2.6 the same)
+//             (at .45, .9 and 1.3 honest fillets and drops cost 8, 2 and 1 % more bytes at equal error; 2.6 +1 %)
 //
 // Tried for the search: first the bundles that touch one's own, then the rest: a quarter slower than the two beside it
 // in the order.
