@@ -23,8 +23,8 @@ struct FrustumPlanes {
     float planes[6][4];  ///< asset space, inward
 };
 struct MeshInput {
-    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares; its drops are moved
-                                  ///< by up to a cell where none would show them
+    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares; drops that no corner
+                                  ///< of a cell lies in are moved by up to a cell, in its memory
     Levels levels;                ///< sizes of cells
     const FrustumPlanes* views;   ///< none: everything
     uint32_t view_count;
