@@ -68,19 +68,21 @@ void seed_point(Mesher& m, uint32_t i) {
             for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) seed_box(m, disc, disc.level, c);
 }
 
-/// A drop that no corner of its cell lies in would not be seen, or come and go as it flies: it moves onto the nearest one.
+/// A drop that no corner of the lattice lies in would not be seen, or come and go as it flies: it moves onto the nearest one.
 void show_drop(const Mesher& m, uint32_t i) {
     constexpr float least = 0.2f, share = 0.5f;  // radius, of a cell: seen at all; where in the drop the corner lies then
+    constexpr int around = 4;                    // corners each way: those of its cell and the next; larger drops nearly always hold one
     const surface::Field& f = *m.input.field;
     const float centre[3] = {f.dx[i], f.dy[i], f.dz[i]};
     int32_t level, tile_coord[3];
     if (!leaf_at(m, centre, level, tile_coord)) return;
     const float cell = m.input.levels.cell(level);
-    if (!(std::abs(f.radius[i]) > least * cell)) return;
+    if (!(std::abs(f.radius[i]) > least * cell && std::abs(f.radius[i]) < cell)) return;
     float nearest = surface::unsupported, away[3] = {};
-    for (int k = 0; k < 8; ++k) {
+    for (int k = 0; k < around * around * around; ++k) {
+        const int step[3] = {k % around - 1, k / around % around - 1, k / (around * around) - 1};
         float r[3];
-        for (int a = 0; a < 3; ++a) r[a] = (std::floor(centre[a] / cell) + float(k >> a & 1)) * cell - centre[a];
+        for (int a = 0; a < 3; ++a) r[a] = (std::floor(centre[a] / cell) + float(step[a])) * cell - centre[a];
         const float x = f.inverse[0][i] * r[0] + f.inverse[3][i] * r[1] + f.inverse[4][i] * r[2];
         const float y = f.inverse[3][i] * r[0] + f.inverse[1][i] * r[1] + f.inverse[5][i] * r[2];
         const float z = f.inverse[4][i] * r[0] + f.inverse[5][i] * r[1] + f.inverse[2][i] * r[2];
