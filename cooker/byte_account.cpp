@@ -34,7 +34,7 @@ Bits bits_of(const AssetDirectory& directory, uint32_t index, uint32_t samples) 
     const std::vector<uint8_t> bytes = read_chunk(directory, index);
     std::vector<format::Track> tracks(record.point_count + record.drop_count);
     std::vector<float> coefficients(record.coefficient_count);
-    format::TrackBlock block{{}, record.point_count, record.drop_count, record.coefficient_count, tracks.data(), coefficients.data()};
+    format::TrackBlock block{{}, 0, record.point_count, record.drop_count, record.coefficient_count, tracks.data(), coefficients.data()};
     const char* why = "it is shorter than its head";
     if (bytes.size() >= format::lattice_steps_bytes) {
         const format::LatticeSteps steps = format::read_steps(bytes.data());
@@ -59,14 +59,15 @@ void share_out(const Bits& bits, uint64_t coded, LayerBytes& layer) {
     };
     layer.structure = take(format::bits_structure), layer.births = take(format::bits_births);
     layer.first_coefficients = take(format::bits_first), layer.motion = take(format::bits_motion);
-    layer.normals = take(format::bits_normals), layer.drops = take(format::bits_drops);
+    layer.normals = take(format::bits_normals), layer.slip = take(format::bits_slip);
+    layer.drops = take(format::bits_drops);
     layer.padding = coded - taken;
 }
 
 }  // namespace
 
 uint64_t LayerBytes::sum() const {
-    return directory + heads + structure + births + first_coefficients + motion + normals + drops + padding;
+    return directory + heads + structure + births + first_coefficients + motion + normals + slip + drops + padding;
 }
 uint64_t ByteAccount::sum() const {
     uint64_t all = header + frame_times + windows + model + settings + unused;
@@ -108,7 +109,7 @@ nlohmann::json to_json(const ByteAccount& account) {
     for (const LayerBytes& l : account.layers)
         layers.push_back({{"directory", l.directory}, {"heads", l.heads}, {"structure", l.structure}, {"births", l.births},
                           {"first_coefficients", l.first_coefficients}, {"motion", l.motion}, {"normals", l.normals},
-                          {"drops", l.drops}, {"padding", l.padding}});
+                          {"slip", l.slip}, {"drops", l.drops}, {"padding", l.padding}});
     return {{"header", account.header}, {"frame_times", account.frame_times}, {"windows", account.windows}, {"model", account.model},
             {"settings", account.settings}, {"unused", account.unused}, {"layers", layers}};
 }

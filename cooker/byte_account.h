@@ -16,6 +16,7 @@ struct LayerBytes {
     uint64_t births = 0;              ///< where on the lattice tracks stand
     uint64_t first_coefficients = 0;  ///< mean normal, and the mean position's rest along it
     uint64_t motion = 0, normals = 0; ///< all further terms
+    uint64_t slip = 0;                ///< of the liquid along the surface
     uint64_t drops = 0;
     uint64_t padding = 0;             ///< up to whole bytes, at the end of every chunk
     uint64_t sum() const;

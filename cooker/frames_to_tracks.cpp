@@ -38,11 +38,11 @@ Sweep alive_at(const Window& window, int sample) {
 /// Carries every track alive at sample − 1 on to sample; those that cannot be carried have died.
 void carry_on(Window& window, int sample, int jobs, size_t first_path = 0) {
     const SurfaceFrame &from = *window.frames[size_t(sample - 1)], &to = *window.frames[size_t(sample)];
-    const float seconds = float(window.seconds[size_t(sample)] - window.seconds[size_t(sample - 1)]);
+    const std::vector<glm::vec3>& motion = window.motion[size_t(sample - 1)];
     parallel_for(window.paths.size() - first_path, jobs, [&](size_t i) {
         Path& path = window.paths[first_path + i];
         if (path.death != sample - 1 || path.cause != Death::none) return;
-        if (const auto next = carry_point(from, to, seconds, path.at.back(), path.radius)) {
+        if (const auto next = carry_point(from, motion, to, path.at.back(), path.radius)) {
             path.at.push_back(*next);
             path.correction.push_back(path.correction.back()), path.tilt.push_back(path.tilt.back());
             ++path.death;
@@ -180,7 +180,20 @@ TrackSamples samples_of(const Window& window, const Path& path) {
         const SurfacePoint p = path.target(s);
         samples.position.push_back(p.position), samples.normal.push_back(p.normal);
     }
+    const auto seconds = [&](int s) { return window.seconds[size_t(s)]; };
+    for (const SurfacePoint& p : path.at) samples.slip += p.velocity / float(path.at.size());
+    if (path.death > path.birth)
+        samples.slip -= (samples.position.back() - samples.position.front()) / float(seconds(path.death) - seconds(path.birth));
     return samples;
+}
+
+/// Step of slip: fine against how fast the liquid is.
+float slip_step_of(const Window& window) {
+    constexpr double share = 0.35;  // of the mean speed
+    double sum = 0, count = 0;
+    for (const Path& path : window.paths)
+        for (const SurfacePoint& p : path.at) sum += glm::length(p.velocity), ++count;
+    return count > 0 ? float(share * sum / count) : 0;
 }
 
 /// Where the corrected surface is under x, along the axis.
@@ -210,16 +223,18 @@ void grow_tracks(Window& window, const std::vector<Path>& survivors, const Windo
 
 CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables) {
     CodedWindow coded;
+    coded.quantiser = goal.quantiser;
+    if (window.slips) coded.quantiser.slip_step = slip_step_of(window);
     const auto code = [&](size_t first) {
         coded.tracks.resize(window.paths.size()), coded.decoded.resize(window.paths.size());
         parallel_for(window.paths.size() - first, goal.jobs, [&](size_t k) {
             const size_t i = first + k;
             const Path& path = window.paths[i];
-            coded.tracks[i] = quantise_track(samples_of(window, path), goal.quantiser, goal.origin, tables,
+            coded.tracks[i] = quantise_track(samples_of(window, path), coded.quantiser, goal.origin, tables,
                                              [&](uint32_t sample, const glm::vec3& x, const glm::vec3& axis) {
                                                  return project(window, path, path.birth + int(sample), x, axis);
                                              });
-            coded.decoded[i] = dequantise_track(coded.tracks[i], goal.quantiser, goal.origin, tables);
+            coded.decoded[i] = dequantise_track(coded.tracks[i], coded.quantiser, goal.origin, tables);
         });
     };
     code(0);
@@ -239,8 +254,8 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     mend(window, coded, goal, spoilt);
     code(whole);
     for (const TrackSamples& drop : track_drops(window)) {
-        coded.tracks.push_back(quantise_track(drop, goal.quantiser, goal.origin, tables));
-        coded.decoded.push_back(dequantise_track(coded.tracks.back(), goal.quantiser, goal.origin, tables));
+        coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));
+        coded.decoded.push_back(dequantise_track(coded.tracks.back(), coded.quantiser, goal.origin, tables));
     }
     return coded;
 }

@@ -17,6 +17,7 @@ struct WindowGoal {
 struct CodedWindow {
     std::vector<QuantisedTrack> tracks;   ///< of Window::paths, in their order; then the drops
     std::vector<TrackSamples> decoded;    ///< what each decodes to
+    Quantiser quantiser{};                ///< the goal's, with the step of slip
 };
 
 /// Fills window.paths: survivors of the window before (points on its last frame) are carried on, then births and

@@ -53,6 +53,7 @@ bool stored_before(const RawTrack& a, const RawTrack& b) {
                                   t.second_terms, t.axis[0], t.axis[1]};
         for (uint32_t i = 0; i < t.position_terms; ++i) k.insert(k.end(), t.position[i], t.position[i] + 3);
         for (uint32_t i = 0; i < t.second_terms; ++i) k.insert(k.end(), t.second[i], t.second[i] + 6);
+        k.insert(k.end(), t.slip, t.slip + 2);
         return k;
     };
     return key(a) < key(b);
@@ -124,6 +125,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
     append(out.bytes, steps.normal_step);
     for (const float x : steps.origin) append(out.bytes, x);
     append(out.bytes, steps.ratio, 2);
+    append(out.bytes, steps.slip_step);
 
     std::vector<format::Track> records(tracks.size());
     std::vector<float> coefficients(out.shape.coefficient_count);
@@ -150,7 +152,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
     }
     coder.finish();
     out.bits = {spent[format::bits_structure], spent[format::bits_births] + spent[format::bits_first], spent[format::bits_motion],
-                spent[format::bits_normals], spent[format::bits_drops]};
+                spent[format::bits_normals], spent[format::bits_slip], spent[format::bits_drops]};
     return out;
 }
 

@@ -21,6 +21,7 @@ struct TrackSamples {
     std::vector<glm::vec3> position;           ///< asset space, metres
     std::vector<glm::vec3> normal;             ///< points: unit
     std::vector<std::array<float, 6>> shape;   ///< drops: xx yy zz xy xz yz, metres
+    glm::vec3 slip{};                          ///< points: mean velocity of the liquid past the track, m/s; along the surface counts
 };
 struct Quantiser {
     float step;             ///< along the normal, metres: the lattice of what shows; decoded rms error ≈ .4 of it
@@ -30,6 +31,7 @@ struct Quantiser {
     /// step and equal rms error a track costs a quarter more.
     float time_tolerance;
     float normal_tolerance; ///< likewise for normals, radians; cheapest at about 1 × normal_step
+    float slip_step = 0;    ///< of slip, m/s; 0: none is kept
 };
 /// Integers on the lattice of a Quantiser.
 struct QuantisedTrack {
@@ -39,6 +41,7 @@ struct QuantisedTrack {
     int32_t axis[2];                  ///< mean normal, octahedral (points)
     std::vector<int32_t> position;    ///< [term][t1, t2, n] in the frame of axis; drops: [term][xyz]
     std::vector<int32_t> second;      ///< normals [term][3] in that frame, or shape [term][6]
+    int32_t slip[2] = {0, 0};         ///< in that frame, in slip_step
 };
 /// Offset along `axis` (unit) that brings x at the given sample of life onto the source surface; NaN: cannot say.
 using ProjectAlong = std::function<float(uint32_t sample, const glm::vec3& x, const glm::vec3& axis)>;
@@ -59,7 +62,7 @@ float rough_bits(const QuantisedTrack& track);
 
 /// Where the bytes went, in bits (fractional: from the coder's probabilities).
 struct ChunkBits {
-    double structure = 0, births = 0, motion = 0, normals = 0, drops = 0;
+    double structure = 0, births = 0, motion = 0, normals = 0, slip = 0, drops = 0;
 };
 struct EncodedChunk {
     std::vector<uint8_t> bytes;

@@ -16,7 +16,7 @@ constexpr const char* part_generator = "rill cook, part";
 
 json to_json(const SpanResult& s) {
     return {{"span", s.span}, {"numbers", s.numbers}, {"seconds", s.seconds},
-            {"bits", {s.bits.structure, s.bits.births, s.bits.motion, s.bits.normals, s.bits.drops}},
+            {"bits", {s.bits.structure, s.bits.births, s.bits.motion, s.bits.normals, s.bits.slip, s.bits.drops}},
             {"layer_bytes", s.layer_bytes}, {"tracks", s.tracks}, {"point_frames", s.point_frames}, {"lives", s.lives}, {"deaths", s.deaths},
             {"tolerance", s.tolerance}, {"attempts", s.attempts}, {"measured", to_json(s.measured)}};
 }
@@ -25,7 +25,7 @@ SpanResult span_from_json(const json& j) {
     SpanResult s;
     s.span = j.at("span"), s.numbers = j.at("numbers").get<std::vector<int>>(), s.seconds = j.at("seconds").get<std::vector<double>>();
     const json& bits = j.at("bits");
-    s.bits = {bits.at(0), bits.at(1), bits.at(2), bits.at(3), bits.at(4)};
+    s.bits = {bits.at(0), bits.at(1), bits.at(2), bits.at(3), bits.at(4), bits.at(5)};
     s.layer_bytes = j.at("layer_bytes").get<std::vector<double>>();
     s.tracks = j.at("tracks"), s.point_frames = j.at("point_frames"), s.tolerance = j.at("tolerance"), s.attempts = j.at("attempts");
     s.lives = j.at("lives").get<std::vector<uint64_t>>(), s.deaths = j.at("deaths").get<std::vector<uint64_t>>();
@@ -67,7 +67,7 @@ json lives_json(const SpanResult& all) {
 
 void add(SpanResult& sum, const SpanResult& more) {
     sum.bits.structure += more.bits.structure, sum.bits.births += more.bits.births, sum.bits.motion += more.bits.motion;
-    sum.bits.normals += more.bits.normals, sum.bits.drops += more.bits.drops;
+    sum.bits.normals += more.bits.normals, sum.bits.slip += more.bits.slip, sum.bits.drops += more.bits.drops;
     add(sum.layer_bytes, more.layer_bytes), add(sum.lives, more.lives), add(sum.deaths, more.deaths);
     sum.tracks += more.tracks, sum.point_frames += more.point_frames, sum.measured.add(more.measured);
     const size_t shared = sum.numbers.empty() ? 0 : 1;  // the border frame
@@ -83,7 +83,7 @@ json asset_settings(const CookFacts& facts, const std::vector<SpanResult>& spans
         list.push_back({{"first_frame", s.numbers.front()}, {"p99_m", s.measured.p99()}, {"tolerance_m", s.tolerance}, {"attempts", s.attempts}});
     settings["spans"] = list;
     settings["bytes"] = {{"structure", bytes(all.bits.structure)}, {"births", bytes(all.bits.births)}, {"motion", bytes(all.bits.motion)},
-                         {"normals", bytes(all.bits.normals)}, {"drops", bytes(all.bits.drops)}};
+                         {"normals", bytes(all.bits.normals)}, {"slip", bytes(all.bits.slip)}, {"drops", bytes(all.bits.drops)}};
     settings["layer_bytes"] = all.layer_bytes, settings["tracks"] = all.tracks;
     settings["points_per_frame"] = double(all.point_frames) / double(all.numbers.size());
     settings["lives"] = lives_json(all);

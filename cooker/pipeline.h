@@ -3,7 +3,8 @@
 //
 //   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids
 //   frames_to_samples      where the surface decoded so far is wrong, new points are born
-//   samples_to_tracks      points are carried through the window's frames, both ways, held to the surface
+//   surface_motion         how each surface moves onto the next
+//   samples_to_tracks      points are carried through the window's frames by that motion, held to the surface
 //   tracks_to_surface      what the tracks decode to, measured at every source vertex; corrections
 //   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
 //   coefficients_to_layers progressive order, blocks
@@ -43,6 +44,8 @@ struct Window {
     int first = 0;                       ///< frame index of sample 0
     bool opens_span = false;             ///< nothing comes from before: the surface stands there from the start
     std::vector<std::shared_ptr<const SurfaceFrame>> frames;
+    std::vector<std::vector<glm::vec3>> motion;  ///< of every vertex of frames[s] onto frames[s + 1], metres
+    bool slips = false;                  ///< the liquid goes another way than `motion`, along the surface: slip is kept
     std::vector<double> seconds;
     std::vector<Path> paths;
     int samples() const { return int(frames.size()); }
@@ -82,8 +85,8 @@ double residual_percentile(const SurfaceFrame& frame, const Residual& residual, 
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual,
                                         const std::vector<SurfacePoint>& points, float threshold, float tolerance);
 
-/// Carries the point at samples[from] to the neighbouring frame; empty where the surface leaves it.
-std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const SurfaceFrame& to, float seconds,
+/// Carries the point to the next frame by the motion of the vertices of this one; empty where the surface leaves it.
+std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vector<glm::vec3>& motion, const SurfaceFrame& to,
                                         const SurfacePoint& point, float radius);
 /// One step of least-squares progressive iterative approximation: every point moves along its normal, and
 /// tilts, by the weighted mean residual around it. Residuals beyond `credible` metres are another sheet's, or for a

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Points carried through time by the fluid's velocity and held to the surface.
+// Points carried through time by the motion of the frames (surface_motion.h) and held to the surface; where the surface leaves
+// them, they slide: first along their own tangent motion, at last staying where they are.
 //
-// The velocity of a frame alone does not land on the next surface in violent liquid (2–5 cells a frame, into
-// walls and other liquid). So the path is sub-stepped through the velocities of BOTH frames, which also serves
-// sources whose velocity is the one that brought the liquid here; where it leaves the surface, the point slides:
-// first along its own tangent motion, at last staying where it is.
-//
-// Tried (dam_break 26-42 at 0.25e, 193 kB): points also pushed apart along the surface, .15 or .4 of the overlap a frame: a
-// quarter of the deaths by crowding, 203 and 216 kB, for the pushes themselves must be coded.
+// What was tried instead: README.md, "How points are carried". Points also pushed apart along the surface, .15 or .4 of the
+// overlap a frame: a quarter of the deaths by crowding, +5 and +12 % of bytes, for the pushes themselves must be coded.
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +12,6 @@
 namespace rill::cooker {
 namespace {
 
-constexpr int sub_steps = 4;
 constexpr float most_off = 0.5f;         // mean edges of the mesh there that a held point may be off it; at 1.2 twice as
                                         // many stray pieces
 constexpr float least_agreement = 0.2f;  // n·n of a vertex that may hold the point
@@ -30,9 +25,16 @@ uint32_t nearest_facing(const SurfaceFrame& frame, const glm::vec3& x, const glm
     return ~0u;
 }
 
-glm::vec3 velocity_near(const SurfaceFrame& frame, const glm::vec3& x, const glm::vec3& normal) {
+/// Where the motion of the frame takes x.
+glm::vec3 moved(const SurfaceFrame& frame, const std::vector<glm::vec3>& motion, const glm::vec3& x, const glm::vec3& normal) {
+    const SurfaceIndex::Hit hit = frame.index.closest(x, 2 * frame.edge);
+    if (hit.distance < 2 * frame.edge) {
+        const Triangle& t = frame.mesh.triangles[hit.triangle];
+        if (glm::dot(frame.mesh.normals[t[0]], normal) > least_agreement)
+            return x + hit.barycentric.x * motion[t[0]] + hit.barycentric.y * motion[t[1]] + hit.barycentric.z * motion[t[2]];
+    }
     const uint32_t v = nearest_facing(frame, x, normal, 4);
-    return v == ~0u || frame.mesh.velocities.empty() ? glm::vec3(0) : frame.mesh.velocities[v];
+    return v == ~0u ? x : x + motion[v];
 }
 
 /// The point of the smoothed surface near x, if the surface comes within `reach`.
@@ -61,19 +63,14 @@ std::optional<SurfacePoint> hold(const SurfaceFrame& frame, const glm::vec3& x, 
 
 }  // namespace
 
-std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const SurfaceFrame& to, float seconds,
+std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vector<glm::vec3>& motion, const SurfaceFrame& to,
                                         const SurfacePoint& point, float radius) {
     if (from.mesh.positions.empty() || to.mesh.positions.empty()) return {};
-    glm::vec3 x = point.position;
-    for (int s = 0; s < sub_steps; ++s) {
-        const float t = (float(s) + 0.5f) / sub_steps;
-        const glm::vec3 v = glm::mix(velocity_near(from, x, point.normal), velocity_near(to, x, point.normal), t);
-        x += v * (seconds / sub_steps);
-    }
-    const float moved = glm::length(x - point.position);
-    const float reach = 2 * to.edge + 0.4f * std::min(moved, 4 * radius);
+    const glm::vec3 x = moved(from, motion, point.position, point.normal);
+    const float way = glm::length(x - point.position);
+    const float reach = 2 * to.edge + 0.4f * std::min(way, 4 * radius);
     if (auto held = hold(to, x, point.normal, radius, reach)) return held;
-    // The fluid leaves the surface (merges, dives): the tangential half of the motion, then none.
+    // The surface is gone from there (merges): the tangential half of the motion, then none.
     const glm::vec3 slide = x - point.normal * glm::dot(x - point.position, point.normal);
     if (auto held = hold(to, glm::mix(point.position, slide, 0.5f), point.normal, radius, 2 * to.edge)) return held;
     return hold(to, point.position, point.normal, radius, 2 * to.edge);

@@ -9,6 +9,7 @@
 #include "frames_to_tracks.h"
 #include "parallel.h"
 #include "rate_search.h"
+#include "surface_motion.h"
 #include "window_to_chunks.h"
 
 namespace rill::cooker {
@@ -20,6 +21,8 @@ constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
 constexpr double first_tolerance = 1.15;     // of the error aimed at
 constexpr double least_gain = 0.4;           // of the error's logarithm per that of the tolerance: crevices narrower than a
                                              // cell stay, and points without end would not tell them
+constexpr double most_miss = 0.3;            // edges, of such liquid from the surface: velocities that carry nothing have more
+constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
@@ -64,6 +67,27 @@ void move_file(const std::string& from, const std::string& to) {
     std::error_code failed;
     fs::rename(from, to, failed);
     if (failed) throw InputError(to + ": cannot be written: " + failed.message());
+}
+
+/// Of a window of more than one frame.
+Past past_of(const Window& window) {
+    const size_t last = window.frames.size() - 1;
+    return {window.frames[last - 1], window.frames[last], window.motion.back(), window.seconds[last] - window.seconds[last - 1]};
+}
+
+/// Fills in the liquid's own motion, if the whole window is calm enough for points to go with it.
+bool go_with_liquid(Window& window, int jobs) {
+    std::vector<std::vector<glm::vec3>> motion(window.frames.size() - 1);
+    double stretch = 0, miss = 0;
+    for (size_t s = 0; s < motion.size(); ++s) {
+        const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
+        motion[s] = liquid_motion(from.mesh, to.mesh, to.index, window.seconds[s + 1] - window.seconds[s], jobs);
+        stretch += mean_stretch(from.mesh, motion[s]) / double(motion.size());
+        miss += mean_miss(from.mesh, motion[s], to.index, 2 * to.edge, jobs) / to.edge / double(motion.size());
+    }
+    if (stretch > most_stretch || miss > most_miss) return false;
+    window.motion = std::move(motion);
+    return true;
 }
 
 }  // namespace
@@ -135,18 +159,18 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
     result.numbers.assign(info.numbers.begin() + begin, info.numbers.begin() + end + 1);
     result.seconds.assign(info.seconds.begin() + begin, info.seconds.begin() + end + 1);
     std::vector<Path> survivors;
-    std::shared_ptr<const SurfaceFrame> border;
+    Past past;
     for (uint32_t first = begin;; first += plan_.window) {
-        Window window = load(first, std::min(end, first + plan_.window), border, float(tolerance));
+        Window window = load(first, std::min(end, first + plan_.window), past, float(tolerance));
         window.opens_span = first == begin;
         const uint32_t last = first + uint32_t(window.samples()) - 1;
         grow_tracks(window, survivors, goal);
         const CodedWindow coded = code_tracks(window, goal, tables_);
         write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), last == end, result);
-        survivors = survivors_of(window);
-        border = window.frames.back();
         done(last - begin);
         if (last == end) break;
+        survivors = survivors_of(window);
+        past = past_of(window);
     }
     write(writer, result);
     return result;
@@ -158,20 +182,31 @@ void SpanCook::write(AssetWriter& writer, const SpanResult& result) const {
     writer.finish(facts);
 }
 
-Window SpanCook::load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border, float tolerance) const {
+Window SpanCook::load(uint32_t first, uint32_t last, Past past, float tolerance) const {
     Window window;
     window.first = int(first);
     window.frames.resize(last - first + 1);
     for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
     parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
-        if (s == 0 && border) {
-            window.frames[s] = border;
+        if (s == 0 && past.border) {
+            window.frames[s] = past.border;
             return;
         }
         Mesh mesh = reader_.read(first + s);
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });
+    const bool known = !reader_.info().velocity_estimated;
+    if (known && go_with_liquid(window, settings_.jobs)) return window;
+    window.slips = known;
+    for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
+        const Mesh &from = window.frames[s]->mesh, &to = window.frames[s + 1]->mesh;
+        const double seconds = window.seconds[s + 1] - window.seconds[s];
+        std::vector<glm::vec3> start;
+        if (past.frame) start = motion_goes_on(past.frame->mesh, past.motion, from, float(seconds / past.seconds), settings_.jobs);
+        past = {window.frames[s], window.frames[s + 1], surface_motion(from, to, settings_.jobs, std::move(start)), seconds};
+        window.motion.push_back(past.motion);
+    }
     return window;
 }
 

@@ -15,6 +15,14 @@
 
 namespace rill::cooker {
 
+/// What a window looks back at: the two last frames of the one before it, and how the surface moved between them. Nothing of it
+/// at the first window of a span.
+struct Past {
+    std::shared_ptr<const SurfaceFrame> frame, border;  ///< border: the window's first frame
+    std::vector<glm::vec3> motion;                      ///< of the vertices of `frame`, metres
+    double seconds = 0;                                 ///< between the two
+};
+
 /// Keeps references to all it is given.
 class SpanCook {
 public:
@@ -32,7 +40,7 @@ private:
     std::vector<size_t> judged_frames_of(uint32_t span) const;
     SpanResult cook(uint32_t span, const std::string& output, double tolerance, const std::function<void(uint32_t)>& done) const;
     void write(AssetWriter& writer, const SpanResult& result) const;
-    Window load(uint32_t first, uint32_t last, const std::shared_ptr<const SurfaceFrame>& border, float tolerance) const;
+    Window load(uint32_t first, uint32_t last, Past past, float tolerance) const;
 
     const SequenceReader& reader_;
     const CookSettings& settings_;

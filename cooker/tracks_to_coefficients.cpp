@@ -266,6 +266,11 @@ Attempt Fitter::attempt_point(const Basis& basis) const {
     track.flags =
         uint8_t(samples.flags | (fine ? format::track_fine : 0) | (basis.cosine ? format::track_cosine : 0));
     track.drop = false;
+    for (int c = 0; c < 2 && steps.slip_step > 0; ++c) {
+        const double slip = glm::dot(dvec3(samples.slip), tangents[c]) / steps.slip_step;
+        if (!std::isfinite(slip)) throw InputError("track: a slip is not finite");
+        track.slip[c] = int32_t(std::lround(std::clamp(slip, -double(format::max_slip), double(format::max_slip))));
+    }
     track.position = flattened(motion);
     track.second = flattened(normals);
     return out;
@@ -308,6 +313,7 @@ format::LatticeSteps lattice_steps(const Quantiser& quantiser, const glm::vec3& 
     format::LatticeSteps steps{quantiser.step, quantiser.normal_step, {origin.x, origin.y, origin.z}, 0};
     if (quantiser.tangent_ratio >= 1 && quantiser.tangent_ratio <= 64)
         steps.ratio = uint16_t(std::lround(quantiser.tangent_ratio * 16));
+    steps.slip_step = quantiser.slip_step;
     if (!format::valid(steps)) throw InputError("quantiser: a step is not positive, finite and sensible");
     return steps;
 }
@@ -327,6 +333,7 @@ format::RawTrack raw_track(const QuantisedTrack& track) {
     raw.second_terms = uint8_t(track.second.size() / channels);
     std::copy(track.lattice, track.lattice + 3, raw.lattice);
     std::copy(track.axis, track.axis + 2, raw.axis);
+    std::copy(track.slip, track.slip + 2, raw.slip);
     for (size_t i = 0; i < track.position.size(); ++i) raw.position[i / 3][i % 3] = track.position[i];
     for (size_t i = 0; i < track.second.size(); ++i) raw.second[i / channels][i % channels] = track.second[i];
     return raw;
@@ -368,7 +375,7 @@ TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quan
     const format::RawTrack raw = raw_track(track);
     std::vector<float> coefficients(format::coefficients_of(raw, track.drop));
     format::Track record;
-    format::TrackBlock block{{},      !track.drop,        track.drop, uint32_t(coefficients.size()),
+    format::TrackBlock block{{}, 0,   !track.drop,        track.drop, uint32_t(coefficients.size()),
                              &record, coefficients.data()};
     if (!format::place_track(raw, steps, track.drop, block, 0, 0))
         throw InputError("track: a value is out of range");
@@ -377,6 +384,7 @@ TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quan
     TrackSamples out;
     out.birth = track.birth, out.death = track.death, out.drop = track.drop;
     out.flags = record.flags & (format::track_born | format::track_dies);
+    for (int c = 0; c < 3 && !track.drop; ++c) out.slip[c] = block.slip_unit * float(record.slip[c]);
     const uint32_t life = track.death - track.birth + 1u, channels = track.drop ? 6 : 3;
     const uint32_t terms = std::max(record.position_terms, record.second_terms);
     const float* second = coefficients.data() + 3 * record.position_terms;

@@ -13,7 +13,7 @@ constexpr uint32_t most_tracks_per_block = 3000;
 
 void add(ChunkBits& sum, const ChunkBits& more) {
     sum.structure += more.structure, sum.births += more.births, sum.motion += more.motion;
-    sum.normals += more.normals, sum.drops += more.drops;
+    sum.normals += more.normals, sum.slip += more.slip, sum.drops += more.drops;
 }
 
 /// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
@@ -97,7 +97,7 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
         const LayerError& error = errors[chunk.layer];
         chunk.spacing = error.spacing, chunk.error_mean = error.mean, chunk.error_p99 = error.p99;
         bound(chunk, decoded, 1.5f * error.spacing);
-        chunk.encoded = encode_chunk(tracks, goal.quantiser, goal.origin, uint32_t(window.samples()), {});
+        chunk.encoded = encode_chunk(tracks, coded.quantiser, goal.origin, uint32_t(window.samples()), {});
     });
     std::erase_if(chunks, [](const ChunkToWrite& chunk) { return chunk.encoded.bytes.empty(); });
     account.layer_bytes.resize(layers);

@@ -20,7 +20,7 @@ using namespace rill::cooker;
 namespace {
 
 constexpr uint32_t window = 25;
-const Quantiser quantiser{0.002f, 4.f, 0.035f, 0.004f, 0.06f};
+const Quantiser quantiser{0.002f, 4.f, 0.035f, 0.004f, 0.06f, 0.05f};
 const glm::vec3 origin(0.5f, -0.25f, 1.f);
 
 struct Tables {
@@ -43,6 +43,7 @@ TrackSamples make_track(std::mt19937& random, uint32_t birth, uint32_t death, bo
     if (birth > 0) track.flags |= format::track_born;
     if (death < window - 1) track.flags |= format::track_dies;
     const glm::vec2 start(unit(random), unit(random));
+    track.slip = {0.4f * start.y + 0.1f * unit(random), -0.4f * start.x, 0.1f * unit(random)};  // a vortex
     const float flip = random() % 4 == 0 ? -1.f : 1.f;  // floors face down
     for (uint32_t s = birth; s <= death; ++s) {
         const float t = s / 24.f * violence;
@@ -97,6 +98,7 @@ std::vector<float> numbers(const format::Track& t, const float* coefficients, bo
     std::vector<float> out = {float(drop),    float(t.birth),          float(t.death),
                               float(t.flags), float(t.position_terms), float(t.second_terms)};
     const float* at = coefficients + t.first_coefficient;
+    if (!drop) out.insert(out.end(), t.slip, t.slip + 3);
     out.insert(out.end(), at, at + t.position_terms * 3 + t.second_terms * (drop ? 6 : 3));
     return out;
 }
@@ -112,7 +114,8 @@ std::vector<std::vector<float>> expected_numbers(const std::vector<QuantisedTrac
     const format::LatticeSteps steps{quantiser.step,
                                      quantiser.normal_step,
                                      {origin.x, origin.y, origin.z},
-                                     uint16_t(quantiser.tangent_ratio * 16)};
+                                     uint16_t(quantiser.tangent_ratio * 16),
+                                     quantiser.slip_step};
     std::vector<std::vector<float>> out;
     for (const QuantisedTrack& q : tracks) {
         format::RawTrack raw{};
@@ -122,11 +125,12 @@ std::vector<std::vector<float>> expected_numbers(const std::vector<QuantisedTrac
         raw.second_terms = uint8_t(q.second.size() / channels);
         std::copy(q.lattice, q.lattice + 3, raw.lattice);
         std::copy(q.axis, q.axis + 2, raw.axis);
+        std::copy(q.slip, q.slip + 2, raw.slip);
         for (size_t i = 0; i < q.position.size(); ++i) raw.position[i / 3][i % 3] = q.position[i];
         for (size_t i = 0; i < q.second.size(); ++i) raw.second[i / channels][i % channels] = q.second[i];
         std::vector<float> memory(q.position.size() + q.second.size());
         format::Track record;
-        format::TrackBlock block{{}, !q.drop, q.drop, uint32_t(memory.size()), &record, memory.data()};
+        format::TrackBlock block{{}, 0, !q.drop, q.drop, uint32_t(memory.size()), &record, memory.data()};
         REQUIRE(format::place_track(raw, steps, q.drop, block, 0, 0));
         format::finish_block(steps, block);
         out.push_back(numbers(record, memory.data(), q.drop));
@@ -164,7 +168,7 @@ TEST_CASE("the bytes do not depend on the order of the tracks, nor on the run") 
     }
     const EncodedChunk chunk = encode(tracks);
     const double bits =
-        chunk.bits.structure + chunk.bits.births + chunk.bits.motion + chunk.bits.normals + chunk.bits.drops;
+        chunk.bits.structure + chunk.bits.births + chunk.bits.motion + chunk.bits.normals + chunk.bits.slip + chunk.bits.drops;
     CHECK(std::abs(bits / 8 + format::lattice_steps_bytes - chunk.bytes.size()) < 4);
     std::mt19937 random(3);
     for (int i = 0; i < 3; ++i) {
@@ -315,6 +319,39 @@ TEST_CASE("truncated, lengthened, flipped and random bytes are refused or harmle
         }
 }
 
+TEST_CASE("slip: along the surface, within its step; cheaper where neighbours say the same; none where none is wanted") {
+    std::mt19937 random(5);
+    std::vector<QuantisedTrack> tracks, noisy, without;
+    Quantiser none = quantiser;
+    none.slip_step = 0;
+    for (int i = 0; i < 400; ++i) {
+        TrackSamples track = make_track(random, 0, window - 1, false);
+        tracks.push_back(quantise_track(track, quantiser, origin, tables()));
+        const TrackSamples back = dequantise_track(tracks.back(), quantiser, origin, tables());
+        glm::vec3 n(0);
+        for (const glm::vec3& m : track.normal) n += m;
+        n = glm::normalize(n);
+        const glm::vec3 along = track.slip - n * glm::dot(track.slip, n);
+        CHECK(glm::distance(back.slip, along) < quantiser.slip_step);
+        CHECK(std::abs(glm::dot(back.slip, n)) < 0.5f * quantiser.slip_step);
+        without.push_back(quantise_track(track, none, origin, tables()));
+        CHECK(dequantise_track(without.back(), none, origin, tables()).slip == glm::vec3(0));
+        track.slip = glm::vec3(float(random() % 1000), float(random() % 1000), 0) / 1000.f - 0.5f;
+        noisy.push_back(quantise_track(track, quantiser, origin, tables()));
+    }
+    const double smooth = encode(tracks).bits.slip;
+    CHECK(smooth > 0);
+    CHECK(smooth < 0.75 * encode(noisy).bits.slip);
+    CHECK(encode_chunk(without, none, origin, window, {}).bits.slip == 0);
+    TrackSamples wild = make_track(random, 0, window - 1, false);
+    wild.slip = {1e6f, -1e6f, 0};  // as far as a track can hold
+    const QuantisedTrack clamped = quantise_track(wild, quantiser, origin, tables());
+    CHECK(std::max(std::abs(clamped.slip[0]), std::abs(clamped.slip[1])) == format::max_slip);
+    CHECK(encode({clamped}).shape.point_count == 1);
+    wild.slip.x = NAN;
+    CHECK_THROWS_AS(quantise_track(wild, quantiser, origin, tables()), InputError);
+}
+
 TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact velocity") {
     std::mt19937 random(2);
     std::vector<TrackSamples> truth;
@@ -372,6 +409,9 @@ TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact veloc
     const glm::vec3 x(points.x[0], points.y[0], points.z[0]), v(points.vx[0], points.vy[0], points.vz[0]);
     evaluate(12.05, 4, points);
     const glm::vec3 later(points.x[0], points.y[0], points.z[0]);
-    CHECK(glm::length((later - x) / (0.05f / 24) - v) < 0.02f);
+    // The velocity is that of the point, as finite differences tell it, and its slip.
+    const TrackSamples& track = glm::distance(truth[0].position[12], x) < 1e-5f ? truth[0] : truth[3];
+    CHECK(glm::length((later - x) / (0.05f / 24) + track.slip - v) < 0.02f);
+    CHECK(glm::length(track.slip) > 0.1f);
     CHECK(std::abs(glm::length(glm::vec3(points.nx[0], points.ny[0], points.nz[0])) - 1) < 1e-5f);
 }

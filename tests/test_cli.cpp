@@ -69,7 +69,7 @@ void check_bytes(const std::string& asset) {
         uint64_t sum = 0;
         for (const auto& [kind, value] : kinds.items()) sum += value.get<uint64_t>();
         CHECK(sum == layer["bytes"].get<uint64_t>() + 72 * chunks);
-        CHECK(kinds["heads"] == 22 * chunks);
+        CHECK(kinds["heads"] == 26 * chunks);
         CHECK(kinds["padding"] <= chunks);  // less than a byte each
         all += sum;
     }

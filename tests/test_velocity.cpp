@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "check_velocity.h"
-#include "estimate_velocity.h"
+#include "surface_motion.h"
 #include "reader_faults.h"
 #include "readers/reader.h"
 #include "sequence_files.h"
@@ -155,10 +155,37 @@ TEST_CASE("estimated velocity lands on the next surface") {
 
     // A ball that falls two edges: not the surface alone, every vertex goes along, tangentially too.
     const Mesh a = bumpy_sphere(16, 0.5f), b = bumpy_sphere(16, 0.5f, {0, 0, -0.15f});
-    const std::vector<glm::vec3> motion = estimate_motion(a, b);
+    const std::vector<glm::vec3> motion = surface_motion(a, b, 0);
     glm::vec3 mean(0);
     for (const glm::vec3& m : motion) mean += m / float(motion.size());
     CHECK(glm::distance(mean, {0, 0, -0.15f}) < 0.03f);
-    CHECK(estimate_motion(a, Mesh{}) == std::vector<glm::vec3>(a.positions.size(), glm::vec3(0)));
-    CHECK(estimate_motion(Mesh{}, a).empty());
+    CHECK(surface_motion(a, Mesh{}, 0) == std::vector<glm::vec3>(a.positions.size(), glm::vec3(0)));
+    CHECK(surface_motion(Mesh{}, a, 0).empty());
+    CHECK(surface_motion(a, b, 1) == surface_motion(a, b, 3));
+
+    // It goes on, for the most part, from where it came to, and by as much as there is time.
+    const Mesh c = bumpy_sphere(16, 0.5f, {0, 0, -0.3f});
+    const std::vector<glm::vec3> all(a.positions.size(), {0, 0, -0.15f});
+    for (const glm::vec3& m : motion_goes_on(a, all, b, 1, 0)) CHECK(glm::distance(m, {0, 0, 0.7f * -0.15f}) < 1e-5f);
+    for (const glm::vec3& m : motion_goes_on(a, all, b, 2, 0)) CHECK(glm::distance(m, {0, 0, 1.4f * -0.15f}) < 1e-5f);
+    CHECK(mean_miss(b, surface_motion(b, c, 0, all), SurfaceIndex(c), 1, 0) < 0.005);
+}
+
+TEST_CASE("the motion of the liquid: where it is sound, how it stretches the surface") {
+    // Falling and gathering speed: half of each velocity, and the surface is met.
+    Mesh a = bumpy_sphere(16, 0.5f), b = bumpy_sphere(16, 0.5f, {0, 0, -0.15f});
+    a.velocities.assign(a.positions.size(), {0, 0, -1}), b.velocities.assign(b.positions.size(), {0, 0, -2});
+    const std::vector<glm::vec3> fall = liquid_motion(a, b, SurfaceIndex(b), 0.1, 0);
+    for (const glm::vec3& m : fall) CHECK(glm::distance(m, {0, 0, -0.15f}) < 1e-6f);
+    CHECK(mean_stretch(a, fall) < 1e-5);
+    CHECK(mean_miss(a, fall, SurfaceIndex(b), 1, 0) < 1e-5);
+    // At rest, where the surface is not.
+    const std::vector<glm::vec3> rest = liquid_motion(a, Mesh{}, SurfaceIndex(b), 0.1, 0);
+    CHECK(mean_stretch(a, rest) == 0);
+    CHECK(mean_miss(a, rest, SurfaceIndex(b), 1, 0) > 0.05);
+    CHECK(mean_miss(a, rest, SurfaceIndex(b), 0.01f, 0) < 0.0101);
+    // A tenth larger in every direction: a fifth of the area.
+    std::vector<glm::vec3> grow = a.positions;
+    for (glm::vec3& g : grow) g *= 0.1f;
+    CHECK(mean_stretch(a, grow) == doctest::Approx(std::log(1.21)).epsilon(1e-3));
 }

@@ -14,7 +14,8 @@ namespace cooker = rill::cooker;
 
 namespace {
 
-constexpr uint32_t versions[] = {rill::format::version_1};
+constexpr uint32_t versions[] = {rill::format::version_2};
+constexpr uint32_t refused[] = {rill::format::version_1};
 
 std::string golden(uint32_t version, const char* ending) {
     return std::string(RILL_GOLDEN "/v") + std::to_string(version) + ending;
@@ -65,8 +66,16 @@ TEST_CASE("every golden loads and decodes to the water it held") {
     }
 }
 
+TEST_CASE("a version that is read no more is refused by its number") {
+    for (uint32_t version : refused) {
+        CAPTURE(version);
+        Opened opened(read_file(golden(version, ".rill")));
+        CHECK(opened.open() == rill::Status::unknown_format);
+    }
+}
+
 TEST_CASE("a version of the future is refused by its number, not taken for damage") {
-    Bytes bytes = read_file(golden(1, ".rill"));
+    Bytes bytes = read_file(golden(rill::format::current_version, ".rill"));
     for (uint32_t version : {0u, rill::format::current_version + 1, 0xF0u, 0xFFFFFFFFu}) {
         CAPTURE(version);
         put(bytes, offsetof(rill::format::Header, version), version);

@@ -25,6 +25,7 @@ struct SequenceInfo {
     std::vector<double> seconds;   ///< time of each on the source's clock
     double frames_per_second = 24;
     VelocityMeaning velocity = VelocityMeaning::none;
+    bool velocity_estimated = false;  ///< from the surfaces: it tells nothing of how the liquid slides along them
     uint64_t raw_bytes = 0;        ///< size of the source files read
 };
 struct ReadOptions {

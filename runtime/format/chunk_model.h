@@ -19,7 +19,7 @@
 namespace rill::format {
 
 /// What Coder::category() is told: where the next bits are spent.
-enum BitCategory : int { bits_structure, bits_births, bits_motion, bits_normals, bits_drops, bits_first, bit_categories };
+enum BitCategory : int { bits_structure, bits_births, bits_motion, bits_normals, bits_drops, bits_first, bits_slip, bit_categories };
 
 /// Magnitude class: 0, 1, 2, 3–4, 5–8, 9–16 …
 inline uint32_t magnitude_class(uint32_t m) {
@@ -127,6 +127,7 @@ private:
         int32_t mean[window][3];         ///< step/16
         int16_t normal[window][3];       ///< of points, 1/16384
         uint32_t track[window];
+        uint8_t slip_rest[window];       ///< Σ |residuals| of slip, at most 255
         uint8_t rest[window][2][rest_terms][3];  ///< |residuals|, at most 255, [positions, normals][term][channel]
     };
 
@@ -175,6 +176,7 @@ private:
     Said said(const Near& moving, uint32_t k, uint32_t channel) const;
     Contexts series_contexts(const RawTrack& t, const Terms& terms, Said about, uint32_t k, uint32_t c, uint32_t others) const;
     bool term(const RawTrack& t, Terms& terms, uint32_t k, const int32_t* wanted, int32_t* out);
+    bool slip(RawTrack& t, const Frame& frame, const RawTrack* source);
     bool series(RawTrack& t, const Frame& frame, bool second, const Near& moving, const RawTrack* source);
 
     Statistics& learned_;
@@ -187,6 +189,7 @@ private:
     uint32_t first_ = 0, done_ = 0, used_ = 0;
     bool drops_ = false;
     uint8_t rest_[2][rest_terms][3];  ///< of the track at hand
+    uint8_t slip_rest_ = 0;
     int64_t carried_[nearest][carried_terms][3];  ///< its motion as its neighbours' says, terms 1 …, in 1/256
     Recent recent_;
     int64_t search_low_[3];
@@ -196,5 +199,6 @@ private:
 
 #include "format/chunk_model_parts.h"
 #include "format/chunk_model_series.h"
+#include "format/chunk_model_slip.h"
 
 }  // namespace rill::format

@@ -58,6 +58,7 @@ void ChunkModel<Coder>::remember(uint32_t index, const RawTrack& t, const Frame&
     recent_.moves[slot] = t.birth < t.death;
     recent_.track[slot] = index;
     std::memcpy(recent_.rest[slot], rest_, sizeof rest_);
+    recent_.slip_rest[slot] = slip_rest_;
     if (recent_.count < window) ++recent_.count;
 }
 
@@ -307,6 +308,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
     if (!series(t, frame, false, moving, source)) return false;
     if (!drops_) coder_.category(bits_normals);
     if (!series(t, frame, true, moving, source)) return false;
+    if (!slip(t, frame, source)) return false;
     const uint32_t size = coefficients_of(t, drops_);
     if (size > block_.coefficient_count - used_) {
         reason = "more coefficients than the directory says";

@@ -26,6 +26,7 @@ inline LatticeSteps read_steps(const uint8_t* bytes) {
     steps.step = float_at(bytes), steps.normal_step = float_at(bytes + 4);
     for (int c = 0; c < 3; ++c) steps.origin[c] = float_at(bytes + 8 + 4 * c);
     steps.ratio = uint16_t(little_endian(bytes + 20, 2));
+    steps.slip_step = float_at(bytes + 22);
     return steps;
 }
 

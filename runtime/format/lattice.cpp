@@ -37,7 +37,7 @@ int64_t square_root(int64_t x) noexcept {
 bool valid(const LatticeSteps& steps) noexcept {
     bool good = std::isfinite(steps.step) && steps.step > 1e-30f && steps.step < 1e15f &&
                 std::isfinite(steps.normal_step) && steps.normal_step > 1e-5f && steps.normal_step < 4.f &&
-                steps.ratio >= 16 && steps.ratio <= 1024;
+                steps.ratio >= 16 && steps.ratio <= 1024 && steps.slip_step >= 0 && steps.slip_step < 1e15f;
     for (const float x : steps.origin) good = good && std::isfinite(x) && std::fabs(x) < 1e30f;
     return good;
 }
@@ -131,6 +131,12 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
     }
     for (uint32_t k = 1; k < raw.position_terms; ++k)
         if (!to_asset(raw.position[k], frame, ratio, out + 3 * k)) return false;
+    for (int c = 0; c < 3 && !drop; ++c) {
+        const int64_t twice = 2 * (int64_t(raw.slip[0]) * frame.row[0][c] + int64_t(raw.slip[1]) * frame.row[1][c]);
+        const int64_t slip = rounded(twice, one);
+        if (magnitude(slip) > 127) return false;
+        track.slip[c] = int8_t(slip);
+    }
     out += 3 * raw.position_terms;
     if (drop) {
         for (uint32_t k = 0; k < raw.second_terms; ++k)
@@ -145,6 +151,7 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
 
 void finish_block(const LatticeSteps& steps, TrackBlock& block) noexcept {
     for (int c = 0; c < 3; ++c) block.origin[c] = steps.origin[c];
+    block.slip_unit = steps.slip_step / 2;
     const int32_t levels = axis_levels(steps);
     const uint32_t count = block.point_count + block.drop_count;
     for (uint32_t i = 0; i < count; ++i) {

@@ -10,14 +10,15 @@
 
 namespace rill::format {
 
-/// Quantiser steps as the chunk head holds them. 22 bytes: step, normal_step, origin as binary32, ratio.
+/// Quantiser steps as the chunk head holds them. 26 bytes: step, normal_step, origin as binary32, ratio, slip_step.
 struct LatticeSteps {
     float step;         ///< normal direction, metres
     float normal_step;  ///< normals, radians
     float origin[3];
     uint16_t ratio;  ///< tangential step / step, in 1/16: 16 … 1024
+    float slip_step = 0;  ///< of slip, m/s; 0: points have none
 };
-inline constexpr uint32_t lattice_steps_bytes = 22;
+inline constexpr uint32_t lattice_steps_bytes = 26;
 /// Finite, positive, ratio in range; says nothing else of the values.
 bool valid(const LatticeSteps& steps) noexcept;
 
@@ -29,6 +30,7 @@ inline constexpr double position_gain = 0.75, normal_gain = 0.75;
 inline constexpr uint8_t track_fine = 8;
 inline constexpr int32_t max_symbol = 1 << 20;  ///< no stored integer is larger
 inline constexpr int32_t max_mean = 1 << 30;    ///< likewise mean positions, in step/16
+inline constexpr int32_t max_slip = 44;         ///< likewise slip: both at once fit Track::slip
 
 /// The integers of one track. Points: position [term][t1, t2, n] in frame_of(axis), term 0 relative to the
 /// lattice point; second [term][t1, t2, n], term 0 unused (the mean normal is the axis). Drops: position
@@ -40,6 +42,7 @@ struct RawTrack {
     int32_t axis[2];     ///< octahedral, |u|, |v| ≤ axis_levels
     int32_t position[max_terms][3];
     int32_t second[max_terms][6];
+    int32_t slip[2];     ///< of points, along t1, t2, in slip_step
 };
 
 /// Levels of one octahedral half axis: neighbouring axes are about normal_step apart.

@@ -15,7 +15,8 @@ inline constexpr uint8_t magic[8] = {'R', 'I', 'L', 'L', '\r', '\n', 0x1a, '\n'}
 /// Numbers are never reused. At or above 0xF0: in flux, refused by release builds of later versions.
 enum Version : uint32_t {
     version_1 = 1,  ///< 2026-11: first
-    current_version = version_1,
+    version_2 = 2,  ///< 2026-11: slip: points follow the surface, and say how the liquid slides under them
+    current_version = version_2,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.

@@ -3,6 +3,8 @@
 // Shared by the cooker (which encodes it) and the runtime (which decodes and evaluates it).
 //
 // A *point track* is a surface point (position + unit normal) over part of a window.
+// It follows the surface, not the liquid, which slides along under it: by its *slip*, a velocity along the surface,
+// the same over the track's life. Point and slip together move as the liquid does.
 // A *drop track* is a small closed component: an ellipsoid (centre + symmetric shape matrix S),
 // surface = { centre + S u : |u| = 1 }. It costs one track where points would need a dozen. S is positive definite for a
 // drop of liquid, negative definite for a bubble: air that it takes out of the liquid around.
@@ -34,13 +36,14 @@ struct Track {
     uint8_t birth, death, flags;
     uint8_t position_terms;      ///< 1 … life length; coefficients stored [term][channel]
     uint8_t second_terms;        ///< normal or shape; stored after the position's, [term][channel]
-    uint8_t reserved[3];
+    int8_t slip[3];              ///< of a point, in TrackBlock::slip_unit, asset axes
 };
 static_assert(sizeof(Track) == 12);
 
 /// Memory belongs to whoever made it; decoding fills it, evaluation reads it.
 struct TrackBlock {
     float origin[3];        ///< added to positions
+    float slip_unit;        ///< m/s; 0: no slip
     uint32_t point_count;   ///< tracks [0, point_count) are points
     uint32_t drop_count;    ///< tracks [point_count, point_count + drop_count) are drops
     uint32_t coefficient_count;
@@ -54,7 +57,7 @@ struct PointSet {
     uint32_t count;
     float *x, *y, *z;
     float *nx, *ny, *nz;    ///< unit
-    float *vx, *vy, *vz;    ///< velocity of the point
+    float *vx, *vy, *vz;    ///< velocity of the liquid there: the point's, and its slip
     float* activity;        ///< (0, 1]: fading in or out
 };
 struct DropSet {

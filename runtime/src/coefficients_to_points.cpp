@@ -89,6 +89,8 @@ uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, 
         combine<3>(coefficients, row, track.position_terms, x);
         combine<3>(coefficients, row + rows->stride, track.position_terms, v);
         for (int c = 0; c < 3; ++c) x[c] += block.origin[c], v[c] *= rows->samples_per_second;
+        if (i < block.point_count)
+            for (int c = 0; c < 3; ++c) v[c] += block.slip_unit * float(track.slip[c]);
         bool sound = true;
         for (int c = 0; c < 3; ++c) sound = sound && std::isfinite(x[c]) && std::isfinite(v[c]);
         if (i < block.point_count) {

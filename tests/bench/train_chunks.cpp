@@ -47,7 +47,7 @@ void learn(const AssetDirectory& directory, uint32_t chunk, uint32_t samples, Su
     const std::vector<uint8_t> bytes = rill::cooker::read_chunk(directory, chunk);
     std::vector<format::Track> tracks(record.point_count + record.drop_count);
     std::vector<float> coefficients(record.coefficient_count);
-    format::TrackBlock block{{}, record.point_count, record.drop_count, record.coefficient_count, tracks.data(), coefficients.data()};
+    format::TrackBlock block{{}, 0, record.point_count, record.drop_count, record.coefficient_count, tracks.data(), coefficients.data()};
     const format::LatticeSteps steps = format::read_steps(bytes.data());
     format::RangeDecoder coder(bytes.data() + format::lattice_steps_bytes, bytes.data() + bytes.size());
     static format::Statistics learned;
@@ -66,7 +66,8 @@ void write(const std::vector<Mean>& means) {
         size_t dots = 0;
         while (i + dots < means.size() && means[i + dots].weight < least_met) ++dots;
         if (dots) {
-            line += dots > 1 ? "." + std::to_string(dots) : ".";
+            line += '.';
+            if (dots > 1) line += std::to_string(dots);
             i += dots;
         } else {
             const long level = std::min(51l, std::max(0l, std::lround(means[i].sum / means[i].weight)));
