@@ -90,6 +90,20 @@ bool go_with_liquid(Window& window, int jobs) {
     return true;
 }
 
+/// How points go from frame to frame. `known`: the velocities are the liquid's own.
+void find_motion(Window& window, Past past, bool known, int jobs) {
+    if (known && go_with_liquid(window, jobs)) return;
+    window.slips = known;
+    for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
+        const Mesh &from = window.frames[s]->mesh, &to = window.frames[s + 1]->mesh;
+        const double seconds = window.seconds[s + 1] - window.seconds[s];
+        std::vector<glm::vec3> start;
+        if (past.frame) start = motion_goes_on(past.frame->mesh, past.motion, from, float(seconds / past.seconds), jobs);
+        past = {window.frames[s], window.frames[s + 1], surface_motion(from, to, jobs, std::move(start)), seconds};
+        window.motion.push_back(past.motion);
+    }
+}
+
 }  // namespace
 
 SpanCook::SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan,
@@ -196,17 +210,7 @@ Window SpanCook::load(uint32_t first, uint32_t last, Past past, float tolerance)
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });
-    const bool known = !reader_.info().velocity_estimated;
-    if (known && go_with_liquid(window, settings_.jobs)) return window;
-    window.slips = known;
-    for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
-        const Mesh &from = window.frames[s]->mesh, &to = window.frames[s + 1]->mesh;
-        const double seconds = window.seconds[s + 1] - window.seconds[s];
-        std::vector<glm::vec3> start;
-        if (past.frame) start = motion_goes_on(past.frame->mesh, past.motion, from, float(seconds / past.seconds), settings_.jobs);
-        past = {window.frames[s], window.frames[s + 1], surface_motion(from, to, settings_.jobs, std::move(start)), seconds};
-        window.motion.push_back(past.motion);
-    }
+    find_motion(window, std::move(past), !reader_.info().velocity_estimated, settings_.jobs);
     return window;
 }
 

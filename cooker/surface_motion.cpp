@@ -42,25 +42,20 @@ void for_each(size_t count, int jobs, const Work& work) {
     });
 }
 
-/// The surface that is gone to, and what the last step found: the next need not search farther.
+/// The surface that is gone to.
 struct Target {
     const Mesh& mesh;
     SurfaceIndex index;
     std::vector<glm::vec3> normals;
-    std::vector<SurfaceIndex::Hit> there, back;  ///< of the vertices that move; of its own, on the surface that moves
-    Target(const Mesh& from, const Mesh& to)
-        : mesh(to), index(to), normals(vertex_normals(to)), there(from.positions.size(), nothing), back(to.positions.size(), nothing) {}
-    static constexpr SurfaceIndex::Hit nothing{{}, 1e30f, 0, {}};
+    explicit Target(const Mesh& to) : mesh(to), index(to), normals(vertex_normals(to)) {}
 };
-
-/// A little farther than `near`, lest rounding hide it; not beyond `reach`.
-float limit(const glm::vec3& x, const glm::vec3& near, float reach) { return std::min(reach, 1.001f * glm::distance(x, near) + 1e-4f * reach); }
 
 glm::vec3 at(const SurfaceIndex::Hit& hit, const Triangle& t, const std::vector<glm::vec3>& values) {
     return hit.barycentric.x * values[t[0]] + hit.barycentric.y * values[t[1]] + hit.barycentric.z * values[t[2]];
 }
 
-std::vector<Pull> find_pulls(const Mesh& from, Target& to, const std::vector<glm::vec3>& motion, float reach, size_t stride, int jobs) {
+/// Of every `stride`-th vertex of either surface.
+std::vector<Pull> find_pulls(const Mesh& from, const Target& to, const std::vector<glm::vec3>& motion, float reach, size_t stride, int jobs) {
     constexpr float alike = 0.3f;  // cosine: across a sheet the other side faces away
     Mesh moved;
     moved.triangles = from.triangles, moved.positions = from.positions;
@@ -69,33 +64,23 @@ std::vector<Pull> find_pulls(const Mesh& from, Target& to, const std::vector<glm
     std::vector<Pull> pulls(motion.size());
     for_each(motion.size(), jobs, [&](size_t i) {
         if (i % stride) return;
-        SurfaceIndex::Hit& hit = to.there[i];
-        const glm::vec3& x = moved.positions[i];
-        hit = to.index.closest(x, hit.distance < 1e30f ? limit(x, hit.point, reach) : reach);
-        if (!(hit.distance < reach)) {
-            hit = Target::nothing;
-            return;
-        }
+        const SurfaceIndex::Hit hit = to.index.closest(moved.positions[i], reach);
+        if (!(hit.distance < reach)) return;
         const glm::vec3 n = at(hit, to.mesh.triangles[hit.triangle], to.normals);
-        if (glm::dot(n, normals[i]) > alike) pulls[i].add(hit.point - x, n, 1);
+        if (glm::dot(n, normals[i]) > alike) pulls[i].add(hit.point - moved.positions[i], n, 1);
     });
     // What the next surface has and nothing of this one goes to: crowns and fingers as they shoot out.
     const SurfaceIndex moved_index(moved);
-    for_each(to.back.size(), jobs, [&](size_t i) {
-        if (i % stride) return;
-        SurfaceIndex::Hit& hit = to.back[i];
-        const glm::vec3& x = to.mesh.positions[i];
-        const bool known = hit.distance < 1e30f;
-        hit = moved_index.closest(x, known ? limit(x, at(hit, moved.triangles[hit.triangle], moved.positions), reach) : reach);
-        if (!(hit.distance < reach)) hit = Target::nothing;
-    });
-    for (size_t i = 0; i < to.back.size(); i += stride) {
-        const SurfaceIndex::Hit& hit = to.back[i];
+    std::vector<SurfaceIndex::Hit> hits((to.mesh.positions.size() + stride - 1) / stride);
+    for_each(hits.size(), jobs, [&](size_t k) { hits[k] = moved_index.closest(to.mesh.positions[k * stride], reach); });
+    for (size_t k = 0; k < hits.size(); ++k) {
+        const SurfaceIndex::Hit& hit = hits[k];
+        const size_t i = k * stride;
         if (!(hit.distance < reach)) continue;
         const Triangle& t = moved.triangles[hit.triangle];
         if (glm::dot(at(hit, t, normals), to.normals[i]) <= alike) continue;
-        for (int k = 0; k < 3; ++k)
-            if (hit.barycentric[k] > 0) pulls[t[size_t(k)]].add(to.mesh.positions[i] - hit.point, to.normals[i], hit.barycentric[k]);
+        for (int c = 0; c < 3; ++c)
+            if (hit.barycentric[c] > 0) pulls[t[size_t(c)]].add(to.mesh.positions[i] - hit.point, to.normals[i], hit.barycentric[c]);
     }
     return pulls;
 }
@@ -139,7 +124,7 @@ std::vector<glm::vec3> surface_motion(const Mesh& from, const Mesh& to, int jobs
     motion.resize(from.positions.size(), glm::vec3(0));
     if (from.triangles.empty() || to.triangles.empty()) return motion;
     const Neighbours neighbours(from);
-    Target target(from, to);
+    const Target target(to);
     const float edge = median_edge(from);
     struct Step {
         float stiffness;
