@@ -3,8 +3,8 @@
 // Shared by the cooker (which encodes it) and the runtime (which decodes and evaluates it).
 //
 // A *point track* is a surface point (position + unit normal) over part of a window.
-// It follows the surface, not the liquid, which slides along under it: by its *slip*, a velocity along the surface,
-// the same over the track's life. Point and slip together move as the liquid does.
+// Where the liquid is violent it follows the surface, and the liquid slides along under it: by its *slip*, a velocity along
+// the surface, the same over the track's life. Point and slip together move as the liquid does. Elsewhere slip is 0.
 // A *drop track* is a small closed component: an ellipsoid (centre + symmetric shape matrix S),
 // surface = { centre + S u : |u| = 1 }. It costs one track where points would need a dozen. S is positive definite for a
 // drop of liquid, negative definite for a bubble: air that it takes out of the liquid around.
