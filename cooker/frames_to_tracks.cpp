@@ -61,9 +61,8 @@ void end(Path& path, int sample, Death cause) {
     }
 }
 
-/// Ends tracks that have run into each other, younger first, and those that their neighbours make needless.
-void thin_out(Window& window, int sample, const WindowGoal& goal) {
-    const Sweep sweep = alive_at(window, sample);
+/// Ends tracks that have run into each other, younger first, and those that their neighbours make needless; from `first` on.
+void thin_out(Window& window, int sample, const WindowGoal& goal, const Sweep& sweep, size_t first = 0) {
     const Surplus surplus = measure_surplus(sweep.points, goal.jobs);
     std::vector<glm::vec3> positions;
     for (const SurfacePoint& p : sweep.points) positions.push_back(p.position);
@@ -76,6 +75,7 @@ void thin_out(Window& window, int sample, const WindowGoal& goal) {
     });
     std::vector<bool> gone(order.size(), false);
     for (uint32_t k : order) {
+        if (sweep.ids[k] < first) continue;
         Path& path = window.paths[sweep.ids[k]];
         const bool needless = surplus.distance[k] < surplus_distance * goal.tolerance && surplus.angle[k] < surplus_angle;
         tree.nearest(positions[k], 9, found);
@@ -152,16 +152,26 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
     }
 }
 
+/// The points of a frame as coded, and the tracks from `first` on, which are not coded yet.
+Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, int sample) {
+    Sweep sweep;
+    sweep.points = decoded_points(coded.decoded, sample, nullptr, 0, &sweep.ids);
+    for (size_t i = first; i < window.paths.size(); ++i)
+        if (window.paths[i].alive(sample)) sweep.ids.push_back(uint32_t(i)), sweep.points.push_back(window.paths[i].target(sample));
+    return sweep;
+}
+
 /// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears. Of frames whose 99th
 /// percentile is farther off than `least` tolerances.
 void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, double least) {
     const size_t first = window.paths.size();
     // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
     for (int s = 0; s < window.samples(); ++s) {
-        if (s > 0) carry_on(window, s, goal.jobs, first);
-        std::vector<SurfacePoint> points = decoded_points(coded.decoded, s);
-        for (size_t i = first; i < window.paths.size(); ++i)
-            if (window.paths[i].alive(s)) points.push_back(window.paths[i].target(s));
+        if (s > 0) {
+            carry_on(window, s, goal.jobs, first);
+            thin_out(window, s, goal, mended_at(window, coded, first, s), first);
+        }
+        const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         const SurfaceFrame& frame = *window.frames[size_t(s)];
         Residual residual = measure_residual(frame, points, goal.jobs);
         if (residual_percentile(frame, residual, 0.99) < least * goal.tolerance) continue;
@@ -214,7 +224,7 @@ void grow_tracks(Window& window, const std::vector<Path>& survivors, const Windo
     for (int s = 0; s < window.samples(); ++s) {
         if (s > 0) {
             carry_on(window, s, goal.jobs);
-            thin_out(window, s, goal);
+            thin_out(window, s, goal, alive_at(window, s));
         }
         if (s > 0 || survivors.empty()) fill_frame(window, s, goal);
     }
