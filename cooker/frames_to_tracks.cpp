@@ -12,16 +12,24 @@ namespace {
 
 constexpr int coding_rounds = 2;
 constexpr int most_rounds = 8;  // of births at one frame
-constexpr float surplus_distance = 0.3f;           // of the tolerance
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
-constexpr float mended = 2;                        // tolerances of error left by coding that bear a point
+constexpr float mended = 3;                        // tolerances of error left by coding that bear a point
 constexpr double spoilt = 1.7;                     // tolerances of a frame's 99th percentile that are mended in the end
 constexpr float spur = 4;                          // tolerances that the decoded mesh may stand off the source
-constexpr float surplus_angle = 0.1f;              // radians
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
 constexpr float widest = 5;                        // spacing that thinning leaves, in edges: beyond, patches outreach
                                                    // the liquid's depth and the winding number has too few discs
+
+/// What a frame may lose when a point is taken away that its neighbours nearly make up for.
+struct Loss {
+    float distance;  ///< tolerances
+    float angle;     ///< radians
+};
+constexpr Loss surplus_loss{0.3f, 0.1f};   // a point on its way; .2 and .45 tolerances: 0 and +2.5 %
+constexpr Loss mending_loss{0.6f, 0.2f};   // one that was born to mend a frame
+constexpr Loss fleeting_loss{0.65f, 0.3f}; // one that lives for so few frames that its birth is most of its bytes
+constexpr size_t fleeting = 4;             // frames
 
 /// The points of one frame while the sweep stands there.
 struct Sweep {
@@ -62,7 +70,7 @@ void end(Path& path, int sample, Death cause) {
 }
 
 /// Ends tracks that have run into each other, younger first, and those that their neighbours make needless; from `first` on.
-void thin_out(Window& window, int sample, const WindowGoal& goal, const Sweep& sweep, size_t first = 0) {
+void thin_out(Window& window, int sample, const WindowGoal& goal, const Sweep& sweep, const Loss& loss, size_t first = 0) {
     const Surplus surplus = measure_surplus(sweep.points, goal.jobs);
     std::vector<glm::vec3> positions;
     for (const SurfacePoint& p : sweep.points) positions.push_back(p.position);
@@ -77,7 +85,7 @@ void thin_out(Window& window, int sample, const WindowGoal& goal, const Sweep& s
     for (uint32_t k : order) {
         if (sweep.ids[k] < first) continue;
         Path& path = window.paths[sweep.ids[k]];
-        const bool needless = surplus.distance[k] < surplus_distance * goal.tolerance && surplus.angle[k] < surplus_angle;
+        const bool needless = surplus.distance[k] < loss.distance * goal.tolerance && surplus.angle[k] < loss.angle;
         tree.nearest(positions[k], 9, found);
         float nearest = 1e30f, third = 1e30f;
         int same = 0;
@@ -169,7 +177,7 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, doub
     for (int s = 0; s < window.samples(); ++s) {
         if (s > 0) {
             carry_on(window, s, goal.jobs, first);
-            thin_out(window, s, goal, mended_at(window, coded, first, s), first);
+            thin_out(window, s, goal, mended_at(window, coded, first, s), mending_loss, first);
         }
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         const SurfaceFrame& frame = *window.frames[size_t(s)];
@@ -178,6 +186,44 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, doub
         mark_spurs(frame, points, spur * goal.tolerance, residual, goal.jobs);
         bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
     }
+}
+
+/// Takes out tracks of few frames that their neighbours nearly make up for in each of them: the least missed first, and of
+/// neighbours only one. What comes from the window before stays: it would be missed at the border.
+void drop_fleeting(Window& window, CodedWindow& coded, const WindowGoal& goal) {
+    const size_t count = window.paths.size();
+    const auto brief = [&](uint32_t id) { return window.paths[id].at.size() <= fleeting && !window.paths[id].continues; };
+    std::vector<float> missed(count, 0.f);  // tolerances
+    std::vector<std::vector<uint32_t>> beside(count);
+    std::vector<VertexTree::Found> found;
+    for (int s = 0; s < window.samples(); ++s) {
+        const Sweep sweep = alive_at(window, s);
+        const Surplus surplus = measure_surplus(sweep.points, goal.jobs);
+        std::vector<glm::vec3> positions;
+        for (const SurfacePoint& p : sweep.points) positions.push_back(p.position);
+        const VertexTree tree(positions);
+        for (size_t k = 0; k < sweep.ids.size(); ++k) {
+            const uint32_t id = sweep.ids[k];
+            if (!brief(id)) continue;
+            missed[id] = std::max(missed[id], surplus.angle[k] < fleeting_loss.angle ? surplus.distance[k] / goal.tolerance : missing);
+            tree.nearest(positions[k], 9, found);
+            for (const auto& f : found)
+                if (glm::dot(sweep.points[f.vertex].normal, sweep.points[k].normal) > 0.3f) beside[id].push_back(sweep.ids[f.vertex]);
+        }
+    }
+    std::vector<uint32_t> order;
+    for (uint32_t i = 0; i < count; ++i)
+        if (brief(i) && missed[i] < fleeting_loss.distance) order.push_back(i);
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return missed[a] < missed[b]; });
+    std::vector<bool> gone(count, false);
+    for (uint32_t i : order) gone[i] = std::none_of(beside[i].begin(), beside[i].end(), [&](uint32_t j) { return gone[j]; });
+    const auto take_out = [&](auto& of_tracks) {
+        size_t kept = 0;
+        for (size_t i = 0; i < count; ++i)
+            if (!gone[i]) std::swap(of_tracks[kept++], of_tracks[i]);
+        of_tracks.resize(kept);
+    };
+    take_out(window.paths), take_out(coded.tracks), take_out(coded.decoded);
 }
 
 TrackSamples samples_of(const Window& window, const Path& path) {
@@ -224,7 +270,7 @@ void grow_tracks(Window& window, const std::vector<Path>& survivors, const Windo
     for (int s = 0; s < window.samples(); ++s) {
         if (s > 0) {
             carry_on(window, s, goal.jobs);
-            thin_out(window, s, goal, alive_at(window, s));
+            thin_out(window, s, goal, alive_at(window, s), surplus_loss);
         }
         if (s > 0 || survivors.empty()) fill_frame(window, s, goal);
     }
@@ -248,7 +294,10 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         });
     };
     code(0);
+    const size_t grown = window.paths.size();
     mend(window, coded, goal, 0);
+    code(grown);
+    drop_fleeting(window, coded, goal);
     for (int round = 0; round < coding_rounds; ++round) {
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
             const SurfaceFrame& frame = *window.frames[s];
