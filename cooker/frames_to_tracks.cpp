@@ -205,10 +205,16 @@ void drop_fleeting(Window& window, CodedWindow& coded, const WindowGoal& goal) {
         for (size_t k = 0; k < sweep.ids.size(); ++k) {
             const uint32_t id = sweep.ids[k];
             if (!brief(id)) continue;
-            missed[id] = std::max(missed[id], surplus.angle[k] < fleeting_loss.angle ? surplus.distance[k] / goal.tolerance : missing);
             tree.nearest(positions[k], 9, found);
-            for (const auto& f : found)
-                if (glm::dot(sweep.points[f.vertex].normal, sweep.points[k].normal) > 0.3f) beside[id].push_back(sweep.ids[f.vertex]);
+            const float reach = widest * window.frames[size_t(s)]->edge;
+            int near = 0;
+            for (const auto& f : found) {
+                if (f.vertex == k || glm::dot(sweep.points[f.vertex].normal, sweep.points[k].normal) < 0.3f) continue;
+                beside[id].push_back(sweep.ids[f.vertex]);
+                near += f.distance2 < reach * reach;
+            }
+            const bool replaceable = near >= 3 && surplus.angle[k] < fleeting_loss.angle;
+            missed[id] = std::max(missed[id], replaceable ? surplus.distance[k] / goal.tolerance : missing);
         }
     }
     std::vector<uint32_t> order;
