@@ -14,7 +14,6 @@ constexpr int coding_rounds = 2;
 constexpr int most_rounds = 8;  // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float mended = 3;                        // tolerances of error left by coding that bear a point
-constexpr double spoilt = 1.7;                     // tolerances of a frame's 99th percentile that are mended in the end
 constexpr float spur = 4;                          // tolerances that the decoded mesh may stand off the source
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
@@ -169,9 +168,8 @@ Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, in
     return sweep;
 }
 
-/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears. Of frames whose 99th
-/// percentile is farther off than `least` tolerances.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, double least) {
+/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
     const size_t first = window.paths.size();
     // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
     for (int s = 0; s < window.samples(); ++s) {
@@ -182,7 +180,6 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, doub
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         const SurfaceFrame& frame = *window.frames[size_t(s)];
         Residual residual = measure_residual(frame, points, goal.jobs);
-        if (residual_percentile(frame, residual, 0.99) < least * goal.tolerance) continue;
         mark_spurs(frame, points, spur * goal.tolerance, residual, goal.jobs);
         bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
     }
@@ -301,7 +298,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     };
     code(0);
     const size_t grown = window.paths.size();
-    mend(window, coded, goal, 0);
+    mend(window, coded, goal);
     code(grown);
     drop_fleeting(window, coded, goal);
     for (int round = 0; round < coding_rounds; ++round) {
@@ -314,10 +311,10 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         });
         code(0);
     }
-    // Now and then a correction spoils a frame.
-    const size_t whole = window.paths.size();
-    mend(window, coded, goal, spoilt);
-    code(whole);
+    // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame.
+    const size_t corrected = window.paths.size();
+    mend(window, coded, goal);
+    code(corrected);
     for (const TrackSamples& drop : track_drops(window)) {
         coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));
         coded.decoded.push_back(dequantise_track(coded.tracks.back(), coded.quantiser, goal.origin, tables));
