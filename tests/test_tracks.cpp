@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+// Which tracks a window keeps: brief ones that their neighbours make up for go, those that mend a frame end when it is mended.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+
+#include "frames_to_tracks.h"
+#include "shapes.h"
+
+using namespace rill::cooker;
+
+namespace {
+
+constexpr float radius = 0.5f;
+constexpr int samples = 12;
+
+struct Tables {
+    std::vector<double> memory;
+    rill::format::BasisTables tables;
+    Tables() : memory(rill::format::basis_tables_bytes(samples) / sizeof(double) + 2) {
+        rill::format::build_basis_tables(tables, memory.data(), samples);
+    }
+    const rill::format::BasisTables& get() const { return tables; }
+};
+
+/// A bumpy ball that stands still.
+Window standing_ball() {
+    Mesh mesh = bumpy_sphere(64, radius);
+    const float edge = float(median_edge(mesh));
+    const auto frame = std::make_shared<const SurfaceFrame>(std::move(mesh), edge);
+    Window window;
+    window.opens_span = true;
+    for (int s = 0; s < samples; ++s) {
+        window.frames.push_back(frame);
+        window.seconds.push_back(s / 24.0);
+        if (s > 0) window.motion.emplace_back(frame->mesh.positions.size(), glm::vec3(0));
+    }
+    return window;
+}
+
+WindowGoal goal_of(const Window& window) {
+    WindowGoal goal;
+    goal.tolerance = 0.1f * window.frames[0]->edge;
+    goal.quantiser = {0.3f * goal.tolerance, 4.f, 0.045f, 0.2f * goal.tolerance, 0.045f};
+    goal.jobs = 2;
+    return goal;
+}
+
+/// The path as it stands in the end, alive at samples first … last.
+Path part_of(const Path& whole, int first, int last) {
+    Path part = whole;
+    part.birth = first, part.death = last, part.cause = Death::none;
+    const auto cut = [&](auto& of_samples) { of_samples.assign(size_t(last - first + 1), of_samples.back()); };
+    cut(part.at), cut(part.correction), cut(part.tilt);
+    return part;
+}
+
+/// Paths that cover the ball, all of them in all samples.
+void cover(Window& window, const WindowGoal& goal) {
+    grow_tracks(window, {}, goal);
+    std::erase_if(window.paths, [](const Path& p) { return p.death < samples - 1; });
+    for (Path& path : window.paths) path = part_of(path, 0, samples - 1);
+}
+
+/// A point of the surface in the middle between a path and its nearest neighbour.
+Path between_paths(const Window& window) {
+    const SurfacePoint& a = window.paths[0].at[0];
+    const SurfacePoint* b = nullptr;
+    for (size_t i = 1; i < window.paths.size(); ++i) {
+        const SurfacePoint& p = window.paths[i].at[0];
+        if (!b || glm::distance(p.position, a.position) < glm::distance(b->position, a.position)) b = &p;
+    }
+    std::vector<VertexTree::Found> found;
+    window.frames[0]->tree.nearest(0.5f * (a.position + b->position), 1, found);
+    Path path = window.paths[0];
+    path.at[0] = {window.frames[0]->mesh.positions[found[0].vertex], window.frames[0]->mesh.normals[found[0].vertex], {}};
+    path.correction[0] = 0, path.tilt[0] = glm::vec2(0);
+    return path;
+}
+
+}  // namespace
+
+TEST_CASE("a track of few frames goes when its neighbours make up for it, and only then") {
+    const Tables tables;
+    Window window = standing_ball();
+    const WindowGoal goal = goal_of(window);
+    cover(window, goal);
+    const size_t grown = window.paths.size();
+    REQUIRE(grown > 50);
+    const Path needless = between_paths(window);
+    const auto left_of = [&](const Path& more) {
+        Window with = window;
+        with.paths.push_back(more);
+        code_tracks(with, goal, tables.get());
+        return with.paths.size();
+    };
+    CHECK(left_of(part_of(needless, 4, 6)) == grown);
+    CHECK(left_of(part_of(needless, 2, 9)) == grown + 1);  // its birth is paid for by many frames
+    Path continued = part_of(needless, 0, 2);
+    continued.continues = true;
+    CHECK(left_of(continued) == grown + 1);                // the window before ends with it
+
+    // One that is needed: of a path only those frames are left that no other serves.
+    Window needed = window;
+    needed.paths[grown / 2] = part_of(window.paths[grown / 2], 4, 6);
+    code_tracks(needed, goal, tables.get());
+    CHECK(std::any_of(needed.paths.begin(), needed.paths.end(), [](const Path& p) { return p.birth == 4 && p.death == 6; }));
+}
+
+TEST_CASE("tracks that mend a frame end when it is mended") {
+    const Tables tables;
+    Window window = standing_ball();
+    const WindowGoal goal = goal_of(window);
+    cover(window, goal);
+    // Nobody covers the cap at one sample.
+    constexpr int bare = 5;
+    const size_t grown = window.paths.size();
+    for (size_t i = 0; i < grown; ++i) {
+        if (window.paths[i].at[0].position.z < 0.2f) continue;
+        const Path whole = window.paths[i];
+        window.paths[i] = part_of(whole, 0, bare - 1);
+        window.paths.push_back(part_of(whole, bare + 1, samples - 1));
+    }
+    code_tracks(window, goal, tables.get());
+    size_t mending = 0, ended = 0;
+    for (const Path& path : window.paths)
+        if (path.birth == bare) ++mending, ended += path.death <= bare + 1;
+    CHECK(mending > 5);
+    CHECK(ended > mending / 2);
+}
