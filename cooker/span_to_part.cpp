@@ -17,6 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int most_attempts = 3;
+constexpr double finer_by = 0.05;       // an error below its target by more is bytes nobody asked for, and worth another attempt
 constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
 constexpr double first_tolerance = 1.15;     // of the error aimed at
 constexpr double least_gain = 0.4;           // of the error's logarithm per that of the tolerance: crevices narrower than a
@@ -131,7 +132,8 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
         const double ratio = result.measured.p99() / aim_.p99, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
         if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate, best);
         kept.attempts = attempt;
-        if (best_miss <= std::log(1 + met_within) || attempt == most_attempts) return kept;
+        const bool near = miss == 0 || (ratio <= 1 + met_within && ratio >= 1 - finer_by);
+        if (near || attempt == most_attempts) return kept;
         if (attempt > 1 && ratio > 1 && tolerance < tolerance_before &&
             std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
         ratio_before = ratio, tolerance_before = tolerance;
