@@ -9,6 +9,7 @@
 #include <memory>
 #include <random>
 
+#include "basis_tables.h"
 #include "format/lattice.h"
 #include "layers_to_chunks.h"
 #include "mesh.h"
@@ -22,18 +23,6 @@ namespace {
 constexpr uint32_t window = 25;
 const Quantiser quantiser{0.002f, 4.f, 0.035f, 0.004f, 0.06f, 0.05f};
 const glm::vec3 origin(0.5f, -0.25f, 1.f);
-
-struct Tables {
-    std::vector<double> memory;
-    format::BasisTables tables;
-    explicit Tables(uint32_t longest) : memory(format::basis_tables_bytes(longest) / sizeof(double)) {
-        format::build_basis_tables(tables, memory.data(), longest);
-    }
-};
-const format::BasisTables& tables() {
-    static Tables built(format::max_window_samples);
-    return built.tables;
-}
 
 /// A point of a travelling wave, or a drop flying by.
 TrackSamples make_track(std::mt19937& random, uint32_t birth, uint32_t death, bool drop, float violence = 1) {

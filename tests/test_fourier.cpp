@@ -7,24 +7,13 @@
 #include <functional>
 #include <vector>
 
-#include "format/fourier_extension.h"
-#include "format/layout.h"
+#include "basis_tables.h"
 
 using namespace rill::format;
 
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
-
-struct Tables {
-    std::vector<double> memory = std::vector<double>(basis_tables_bytes(max_window_samples) / sizeof(double));
-    BasisTables tables;
-    Tables() { build_basis_tables(tables, memory.data(), max_window_samples); }
-};
-const BasisTables& tables() {
-    static Tables built;
-    return built.tables;
-}
 
 struct Row {
     float value[max_terms], derivative[max_terms];

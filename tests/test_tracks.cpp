@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "basis_tables.h"
 #include "frames_to_tracks.h"
 #include "shapes.h"
 
@@ -14,15 +15,6 @@ namespace {
 
 constexpr float radius = 0.5f;
 constexpr int samples = 12;
-
-struct Tables {
-    std::vector<double> memory;
-    rill::format::BasisTables tables;
-    Tables() : memory(rill::format::basis_tables_bytes(samples) / sizeof(double) + 2) {
-        rill::format::build_basis_tables(tables, memory.data(), samples);
-    }
-    const rill::format::BasisTables& get() const { return tables; }
-};
 
 /// A bumpy ball that stands still.
 Window standing_ball() {
@@ -83,7 +75,6 @@ Path between_paths(const Window& window) {
 }  // namespace
 
 TEST_CASE("a track of few frames goes when its neighbours make up for it, and only then") {
-    const Tables tables;
     Window window = standing_ball();
     const WindowGoal goal = goal_of(window);
     cover(window);
@@ -93,7 +84,7 @@ TEST_CASE("a track of few frames goes when its neighbours make up for it, and on
     const auto left_of = [&](const Path& more) {
         Window with = window;
         with.paths.push_back(more);
-        code_tracks(with, goal, tables.get());
+        code_tracks(with, goal, tables());
         return with.paths.size();
     };
     CHECK(left_of(part_of(needless, 4, 6)) == grown);
@@ -106,13 +97,12 @@ TEST_CASE("a track of few frames goes when its neighbours make up for it, and on
     Path needed = part_of(needless, 4, 6);
     for (SurfacePoint& p : needed.at) p.position += 2 * window.frames[0]->edge * p.normal;
     window.paths.push_back(needed);
-    code_tracks(window, goal, tables.get());
+    code_tracks(window, goal, tables());
     CHECK(std::any_of(window.paths.begin(), window.paths.end(),
                       [&](const Path& p) { return p.birth == 4 && p.at[0].position == needed.at[0].position; }));
 }
 
 TEST_CASE("tracks that mend a frame end when it is mended") {
-    const Tables tables;
     Window window = standing_ball();
     const WindowGoal goal = goal_of(window);
     cover(window);
@@ -125,7 +115,7 @@ TEST_CASE("tracks that mend a frame end when it is mended") {
         window.paths[i] = part_of(whole, 0, bare - 1);
         window.paths.push_back(part_of(whole, bare + 1, samples - 1));
     }
-    code_tracks(window, goal, tables.get());
+    code_tracks(window, goal, tables());
     size_t mending = 0, ended = 0;
     for (const Path& path : window.paths)
         if (path.birth == bare) ++mending, ended += path.death <= bare + 1;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../basis_tables.h"
 #include "format/layout.h"
 #include "layers_to_chunks.h"
 #include "parallel.h"
@@ -51,14 +52,6 @@ CubeError error_of(const CubeMesh& mesh, const Frames& frames) {
     return all;
 }
 
-struct Basis {
-    std::vector<double> memory;
-    format::BasisTables tables;
-    Basis() : memory(format::basis_tables_bytes(format::max_window_samples) / sizeof(double)) {
-        format::build_basis_tables(tables, memory.data(), format::max_window_samples);
-    }
-};
-
 /// birth, death, flags, two numbers of terms, mean position, mean normal; then the coefficients.
 uint64_t words_of(const cooker::QuantisedTrack& t) { return 5 + 3 + 2 + t.position.size() + t.second.size(); }
 
@@ -94,7 +87,6 @@ CubeError uncoded_error(const CubeMesh& mesh, const std::vector<Point>& points) 
 
 CubeCost code_in_windows(const CubeMesh& mesh, const std::vector<Point>& points, double rte) {
     constexpr int stride = 60;
-    static const Basis basis;
     cooker::Quantiser quantiser{};
     quantiser.step = quantiser.normal_step = float(std::min(rte, coarsest_step));
     quantiser.tangent_ratio = 1;
@@ -113,9 +105,9 @@ CubeCost code_in_windows(const CubeMesh& mesh, const std::vector<Point>& points,
                 samples.position.emplace_back(q.position);
                 samples.normal.emplace_back(q.normal);
             }
-            tracks.push_back(cooker::quantise_track(samples, quantiser, glm::vec3(0), basis.tables));
+            tracks.push_back(cooker::quantise_track(samples, quantiser, glm::vec3(0), tables()));
             cost.words += words_of(tracks.back());
-            samples = cooker::dequantise_track(tracks.back(), quantiser, glm::vec3(0), basis.tables);
+            samples = cooker::dequantise_track(tracks.back(), quantiser, glm::vec3(0), tables());
             const size_t i = tracks.size() - 1;
             for (int k = first; k <= last; ++k)
                 decoded[size_t(k)][i] = {samples.position[size_t(k - first)], samples.normal[size_t(k - first)]};
