@@ -202,6 +202,7 @@ TEST_CASE("rates, gaps and uneven times") {
     CHECK(got.numbers == std::vector<int>{60, 61, 62, 63});
     CHECK(got.seconds[3] == doctest::Approx(63 / 120.0));
     got = info({0, 0.3 / 24}, 1 / 24.0, 4);  // cyclic: two samples a frame, unevenly
+    CHECK(got.frames_per_second == 48);
     CHECK(got.numbers == std::vector<int>{1, 2, 3, 4});
     CHECK(got.seconds[1] * got.frames_per_second / (got.seconds[2] * got.frames_per_second) == doctest::Approx(0.3));
     CHECK(got.seconds[3] - got.seconds[2] == doctest::Approx(got.seconds[1] - got.seconds[0]));

@@ -110,7 +110,7 @@ private:
         for (size_t i = 1; i < times_.size(); ++i) gaps.push_back(times_[i] - times_[i - 1]);
         if (!gaps.empty()) {
             std::nth_element(gaps.begin(), gaps.begin() + long(gaps.size() / 2), gaps.end());
-            rate_ = 1 / gaps[gaps.size() / 2];
+            rate_ = sampling.acyclic() ? 1 / gaps[gaps.size() / 2] : double(sampling.times.size()) / sampling.cycle;
         }
         if (std::abs(rate_ - std::round(rate_)) < 1e-4 * rate_) rate_ = std::round(rate_);
         bool whole = true;
