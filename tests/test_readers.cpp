@@ -278,12 +278,20 @@ TEST_CASE("PLY velocity by name") {
     CHECK(open_sequence(folder / "f1.ply", options)->read(0).velocities == ball.velocities);
     options.velocity_name = "swirl";
     CHECK_FAULT(fault(folder / "f1.ply", options), "f1.ply", "swirl");
-    for (const char* name : {"velocity_", "vel", "Velocity.", "flip_velocity_", "v_"}) {
+    const auto renamed = [&](const std::string& name, const char (&ends)[4]) {
         std::string other = plain_ply(ball);
-        for (const char* axis : {"x", "y", "z"}) other.replace(other.find(std::string("v") + axis), 2, std::string(name) + axis);
+        for (int a = 0; a < 3; ++a) other.replace(other.find(std::string("v") + "xyz"[a]), 2, name + ends[a]);
         put_file(folder / "f1.ply", other);
-        CHECK(open_sequence(folder / "f1.ply", {})->read(0).velocities == ball.velocities);
+        return open_sequence(folder / "f1.ply", {})->read(0).velocities;
+    };
+    for (const char* name : {"velocity_", "vel", "Velocity.", "flip_velocity_", "v_", ".velocities_", "_VELOCITY_", "_velocity.", "VEL_"}) {
+        CAPTURE(name);
+        CHECK(renamed(name, "xyz") == ball.velocities);
     }
+    CHECK(renamed("VEL_", "XYZ") == ball.velocities);
+    CHECK(renamed("Velocity", "XYZ") == ball.velocities);
+    CHECK(renamed("velocities_", "012") == ball.velocities);
+    for (const char* name : {"level", "vx", "nv_"}) CHECK(renamed(name, "xyz").empty());
 }
 
 TEST_CASE("PLY damage") {
@@ -423,7 +431,25 @@ TEST_CASE("OBJ") {
     CHECK_FAULT(fault(folder / "w1.obj"), "w1.obj");
     put_file(folder / "w1.obj", std::string("\0\1\2\3", 4));
     CHECK_FAULT(fault(folder / "w1.obj"), "w1.obj", "not an OBJ");
-    put_file(folder / "w1.obj", "");
+    const auto refused = [&](const std::string& text, const char* place, const char* cause) {
+        put_file(folder / "w1.obj", text);
+        CHECK_FAULT(fault(folder / "w1.obj"), "w1.obj", place, cause);
+    };
+    const std::string three = "o a\nv 0 0 0\nv 1 0 0\n  v\t1 1 0 1\r\n";
+    refused(three + "f 1 2 99999999999999999999\n", "line 5", "'99999999999999999999' is no vertex");
+    refused(three + "f 1 2 -99999999999999999999\n", "line 5", "is no vertex");
+    refused(three + "f 1 two 3\n", "line 5", "'two' is no vertex");
+    refused(three + "f 1/1 2/2\n", "line 5", "a face of fewer than three corners");
+    refused(three + "f 1 2", "line 5", "fewer than three");  // cut off
+    refused(three + "v 1 2\nf 1 2 3\n", "line 5", "a position of fewer than three numbers");
+    refused(three + "v 1 abc 2\nf 1 2 3\n", "line 5", "'abc' is no number");
+    refused(three + "v 1 1e400 2\nf 1 2 3\n", "line 5", "is no number");
+    refused(three + "v 1 -inf 2\nf 1 2 3\n", "line 5", "a position that is not finite");
+    refused(three, "w1.obj", "vertices without a face");
+    refused("", "w1.obj", "empty file");
+    put_file(folder / "w1.obj", "# no liquid\no water\n");
+    CHECK(fault(folder / "w1.obj") == "");
+    put_file(folder / "w1.obj", three + "f 1//4\t2/7  -1/1/1 \r\nvt 0 0\nl 1 2\nf 1 2 3");
     CHECK(fault(folder / "w1.obj") == "");
 }
 
@@ -438,6 +464,8 @@ TEST_CASE("Draco") {
     CHECK(mesh.triangles.size() == ball.triangles.size());
     CHECK(signed_volume(mesh) == doctest::Approx(signed_volume(ball)).epsilon(0.001));
     CHECK(mesh.velocities[5].x == doctest::Approx(2.4).epsilon(0.001));
+    put_file(folder / "d2.drc", "");
+    CHECK_FAULT(fault(folder / "d2.drc"), "d2.drc", "empty file");
     for (size_t length = 1; length < good.size(); length += 7) {
         put_file(folder / "d2.drc", good.substr(0, length));
         CHECK_FAULT(fault(folder / "d2.drc"), "d2.drc");

@@ -148,7 +148,11 @@ double stated_rate(const fs::path& json_file) {
 }
 
 namespace {
-Mesh read_drc(const fs::path& path, const ReadOptions&) { return draco_decode(read_file(path), path.string()); }
+Mesh read_drc(const fs::path& path, const ReadOptions&) {
+    const std::string bytes = read_file(path);
+    if (bytes.empty()) throw InputError(path.string() + ": empty file");
+    return draco_decode(bytes, path.string());
+}
 }  // namespace
 
 const std::vector<FrameFormat>& frame_formats() {

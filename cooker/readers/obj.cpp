@@ -2,21 +2,71 @@
 // Wavefront OBJ through tinyobjloader: positions and faces. The format has no velocities.
 #include <tiny_obj_loader.h>
 
+#include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <sstream>
+#include <string_view>
 
 #include "readers/file_bytes.h"
 #include "readers/frame_files.h"
 
 namespace rill::cooker {
+namespace {
+
+/// Takes the next word off a line; empty: there is none.
+std::string_view take_word(std::string_view& line) {
+    constexpr const char* space = " \t\r";
+    line.remove_prefix(std::min(line.find_first_not_of(space), line.size()));
+    const std::string_view word = line.substr(0, line.find_first_of(space));
+    line.remove_prefix(word.size());
+    return word;
+}
+std::string quoted(std::string_view word) { return std::string("'").append(word.substr(0, 60)).append("'"); }
+template <class T>
+bool parse_all(std::string_view word, T& value) {
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    return error == std::errc() && end == word.data() + word.size();
+}
+
+/// Why a line cannot be used, or nothing. tinyobjloader takes what is no number for 0, and any index too large for another.
+std::string fault_of(std::string_view line) {
+    const std::string_view kind = take_word(line);
+    if (kind == "v")
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::string_view word = take_word(line);
+            double value = 0;
+            if (word.empty()) return "a position of fewer than three numbers";
+            if (!parse_all(word, value)) return quoted(word) + " is no number";
+            if (!std::isfinite(value)) return "a position that is not finite";
+        }
+    if (kind == "f")
+        for (int corner = 0;; ++corner) {
+            const std::string_view word = take_word(line), index = word.substr(0, word.find('/'));
+            int32_t value = 0;
+            if (word.empty() && corner < 3) return "a face of fewer than three corners";
+            if (word.empty()) break;
+            if (!parse_all(index, value) || value == 0) return quoted(index) + " is no vertex";
+        }
+    return "";
+}
+
+void check_lines(std::string_view bytes, const std::string& name) {
+    for (size_t at = 0, end, line = 1; at < bytes.size(); at = end + 1, ++line) {
+        end = std::min(bytes.find('\n', at), bytes.size());
+        const std::string fault = fault_of(bytes.substr(at, end - at));
+        if (!fault.empty()) throw InputError(name + ": line " + std::to_string(line) + ": " + fault);
+    }
+}
+
+}  // namespace
 
 Mesh read_obj(const std::filesystem::path& path, const ReadOptions&) {
     const std::string name = path.string();
     const std::string bytes = read_file(path);
     if (bytes.find('\0') != std::string::npos) throw InputError(name + ": not an OBJ file (it holds NUL bytes)");
-    // tinyobjloader takes what is no number, such as nan, for 0.
-    for (size_t at = 0; at < bytes.size(); at = bytes.find('\n', at) == std::string::npos ? bytes.size() : bytes.find('\n', at) + 1)
-        if (bytes.compare(at, 2, "v ") == 0 && bytes.substr(at + 2, bytes.find('\n', at) - at - 2).find_first_of("nN") != std::string::npos)
-            throw InputError(name + ": a position that is not finite at byte " + std::to_string(at));
+    if (bytes.empty()) throw InputError(name + ": empty file");
+    check_lines(bytes, name);
     std::istringstream stream(bytes);
     tinyobj::attrib_t attributes;
     std::vector<tinyobj::shape_t> shapes;
@@ -41,6 +91,7 @@ Mesh read_obj(const std::filesystem::path& path, const ReadOptions&) {
             at += corners;
         }
     }
+    if (mesh.triangles.empty() && !mesh.positions.empty()) throw InputError(name + ": vertices without a face are not a surface");
     return mesh;
 }
 

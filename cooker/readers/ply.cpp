@@ -2,6 +2,7 @@
 // PLY with whatever properties the exporter put in. (The PLY libraries in Debian drop velocities or read
 // counts without checking them, so this reader is our own.)
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include "readers/file_bytes.h"
 #include "readers/frame_files.h"
 #include "readers/ply_header.h"
+#include "readers/velocity_names.h"
 
 namespace rill::cooker {
 namespace {
@@ -93,16 +95,23 @@ bool find_triple(const PlyElement& vertex, const std::array<std::string, 3>& nam
     return true;
 }
 
-/// Names that exporters give velocity, or the spellings of the one asked for.
+/// Three components called NAME and an ending: NAME as users know velocity, or as they asked for it.
 bool find_velocity(const PlyElement& vertex, const std::string& asked, int (&place)[3]) {
-    static constexpr const char* endings[][3] = {
-        {"_x", "_y", "_z"}, {"x", "y", "z"}, {".x", ".y", ".z"}, {"_0", "_1", "_2"}, {"[0]", "[1]", "[2]"}};
-    std::vector<std::string> names = {asked};
-    if (asked.empty()) names = {"v", "velocity", "vel", "Velocity", "flip_velocity"};
-    for (const std::string& name : names)
-        for (const auto& ends : endings)
-            if (find_triple(vertex, {name + ends[0], name + ends[1], name + ends[2]}, place)) return true;
-    return asked.empty() && find_triple(vertex, {"u", "v", "w"}, place);
+    using Endings = std::array<std::string, 3>;
+    static const Endings endings[] = {{"_x", "_y", "_z"}, {"x", "y", "z"}, {".x", ".y", ".z"}, {"_0", "_1", "_2"},
+                                      {"[0]", "[1]", "[2]"}, {"_X", "_Y", "_Z"}, {"X", "Y", "Z"}};
+    int best = -1;
+    for (const PlyProperty& first : vertex.properties)
+        for (const Endings& ends : endings) {
+            if (!first.name.ends_with(ends[0])) continue;
+            const std::string name = first.name.substr(0, first.name.size() - ends[0].size());
+            const int rank = velocity_rank(name, asked);
+            int found[3];
+            if (rank < 0 || (best >= 0 && rank >= best) || !find_triple(vertex, {name + ends[0], name + ends[1], name + ends[2]}, found)) continue;
+            best = rank;
+            std::copy(found, found + 3, place);
+        }
+    return best >= 0 || (asked.empty() && find_triple(vertex, {"u", "v", "w"}, place));
 }
 
 void read_vertices(Mesh& mesh, const PlyElement& element, Values& values, const std::string& asked) {
