@@ -6,7 +6,9 @@
 
 #include <csignal>
 #include <cstdio>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "readers/reader.h"
 #include "sequence_files.h"
@@ -480,6 +482,65 @@ TEST_CASE("compare: Draco's size falls and its error grows with fewer bits") {
     const Result missing = run_rill("compare " + clip().input + " --asset " + clip().asset + " --frames 3:3 --decimator /nonexistent/tool");
     CHECK(missing.code == 2);
     CHECK(missing.text.find("/nonexistent/tool: ") != std::string::npos);
+}
+
+TEST_CASE("cook: warnings tell what is wrong and what to do about it") {
+    const TestFolder folder;
+    const auto check = [&](const char* name, std::vector<int> numbers, const std::function<void(Mesh&)>& change, const std::vector<std::string>& words) {
+        CAPTURE(name);
+        for (const int number : numbers) {
+            Mesh mesh = Clip::frame(number);
+            change(mesh);
+            put_file(folder / name + "/f" + std::to_string(number) + ".ply", plain_ply(mesh));
+        }
+        const Result result = run_rill("cook " + (folder / name) + " --quiet --survey " + (folder / "survey"));
+        CAPTURE(result.text);
+        CHECK(result.code == 0);
+        CHECK(std::count(result.text.begin(), result.text.end(), '\n') == (words.empty() ? 0 : 1));
+        for (const std::string& word : words) CHECK_MESSAGE(has(result, word), word);
+    };
+    const std::vector<int> three = {3, 4, 5};
+    check("sound", three, [](Mesh&) {}, {});
+    check("open", three, [](Mesh& m) { m.triangles.resize(m.triangles.size() - 5); }, {"warning", "f3.ply: the mesh is open (", "export the whole liquid"});
+    check("inside_out", three, [](Mesh& m) { for (Triangle& t : m.triangles) std::swap(t[1], t[2]); }, {"f3.ply: triangles face inward"});
+    check("gap", {3, 4, 6}, [](Mesh&) {}, {"frame 5 is missing", "bake what is missing"});
+    check("bare", three, [](Mesh& m) { m.velocities.clear(); }, {"f3.ply: no velocity; it is estimated"});
+    check("fast", {3, 6, 9}, [](Mesh& m) { for (glm::vec3& v : m.velocities) v *= 24.0f; }, {"multiplied by 0.04167", "by the frame rate"});
+    const auto box = [](Mesh& m) { for (glm::vec3& x : m.positions) x = glm::clamp(4.0f * x, glm::vec3(-1), glm::vec3(1)); };
+    check("tank", three, [&](Mesh& m) { m = bumpy_sphere(32, 0.5f), m.velocities.assign(m.positions.size(), {}), box(m); }, {"touches its bounds: 100 %", "leave out sides"});
+}
+
+TEST_CASE("every key of every report stands in REPORTS.md") {
+    const TestFolder folder;
+    const std::string manual = get_file(RILL_CONTENT "/../cooker/REPORTS.md"), part = " --frames 3:4 --jobs 1 --json ";
+    std::set<std::string> told;  // the words between backticks
+    bool ticked = false;
+    std::string word;
+    for (const char c : manual) {
+        const bool letter = std::isalnum(static_cast<unsigned char>(c)) || c == '_';
+        if (letter) word += c;
+        if (!letter && ticked) told.insert(word);
+        if (!letter) word.clear();
+        ticked ^= c == '`';
+    }
+    CHECK(run_rill("verify " + clip().asset + " " + clip().input + " --substeps 2" + part + (folder / "verify")).code == 0);
+    CHECK(run_rill("compare " + clip().input + " --asset " + clip().asset + part + (folder / "compare")).code == 0);
+    CHECK(run_rill("bench " + clip().asset + part + (folder / "bench")).code == 0);
+    put_file(folder / "info", run_rill("info --json " + clip().asset).text);
+    put_file(folder / "cook", get_file(clip().report));
+    for (const std::string report : {"cook", "info", "verify", "compare", "bench"}) {
+        CAPTURE(report);
+        std::set<std::string> keys;
+        const std::function<void(const nlohmann::json&)> collect = [&](const nlohmann::json& json) {
+            for (const auto& [key, value] : json.items()) {
+                if (json.is_object()) keys.insert(key);
+                if (value.is_structured()) collect(value);
+            }
+        };
+        collect(json_of(folder / report));
+        CHECK(keys.size() > 10);
+        for (const std::string& key : keys) CHECK_MESSAGE(told.count(key) == 1, key);
+    }
 }
 
 TEST_CASE("cook: dry run, up to date, depfile, segments and link") {
