@@ -10,8 +10,8 @@
 namespace rill::cooker {
 namespace {
 
-constexpr double clearly = 0.7;
-constexpr size_t most_pairs = 4, most_samples = 400, fewest_samples = 50;
+constexpr double clearly = 0.7, clearly_far = 0.4;
+constexpr size_t most_pairs = 4, most_samples = 400, fewest_samples = 50, most_apart = 16;  // apart: frames
 
 /// Vertices that moved across the surface of the neighbouring frame, from where and how fast.
 struct Moved {
@@ -123,48 +123,82 @@ double likely(double factor, double rate, double longest, std::string& words) {
     return factor;
 }
 
+/// Pairs of frames, evenly spread, with what moved between them.
+struct Pairs {
+    std::vector<std::unique_ptr<Mesh>> meshes;
+    std::vector<std::unique_ptr<SurfaceIndex>> indices;
+    std::vector<Moved> forward, backward;
+    std::vector<size_t> first;  ///< frame of each
+    size_t apart = 1;           ///< frames
+    glm::vec3 lower{1e30f}, upper{-1e30f};
+    size_t samples = 0;
+    double still = 0;  ///< sum over the samples
+};
+Pairs look_at(const SequenceReader& reader, size_t apart) {
+    const SequenceInfo& info = reader.info();
+    const size_t starts = info.numbers.size() - apart, count = std::min(most_pairs, starts);
+    Pairs pairs;
+    pairs.apart = apart;
+    for (size_t p = 0; p < count; ++p) {
+        const size_t k = starts * (2 * p + 1) / (2 * count);
+        for (size_t i : {k, k + apart}) {
+            pairs.meshes.push_back(std::make_unique<Mesh>(reader.read(i)));
+            pairs.indices.push_back(std::make_unique<SurfaceIndex>(*pairs.meshes.back()));
+            for (const glm::vec3& x : pairs.meshes.back()->positions)
+                pairs.lower = glm::min(pairs.lower, x), pairs.upper = glm::max(pairs.upper, x);
+        }
+        const Mesh &a = *pairs.meshes[2 * p], &b = *pairs.meshes[2 * p + 1];
+        if (a.triangles.empty() || b.triangles.empty()) continue;
+        const double seconds = info.seconds[k + apart] - info.seconds[k];
+        pairs.first.push_back(k);
+        pairs.forward.push_back(moved(a, *pairs.indices[2 * p + 1], seconds));
+        pairs.backward.push_back(moved(b, *pairs.indices[2 * p], -seconds));
+    }
+    for (const auto* all : {&pairs.forward, &pairs.backward})
+        for (const Moved& m : *all) pairs.samples += m.position.size(), pairs.still += m.still;
+    return pairs;
+}
+/// Frames as far apart as it takes for enough to move: at 120 Hz little does from one to the next.
+Pairs telling_pairs(const SequenceReader& reader) {
+    Pairs pairs = look_at(reader, 1);
+    for (size_t apart = 2; pairs.samples < fewest_samples && apart <= most_apart && apart < reader.info().numbers.size(); apart *= 2)
+        pairs = look_at(reader, apart);
+    return pairs;
+}
+
+void warn_of_uneven_times(const SequenceInfo& info, const Pairs& pairs, const std::vector<Moved>& moved, double factor,
+                          const std::function<void(const std::string&)>& warn) {
+    for (size_t p = 0; p < moved.size(); ++p)
+        if (const double length = length_of(moved[p], factor); length != 1) {
+            warn(info.path + ": frames are unevenly spaced in time: from frame " + std::to_string(info.numbers[pairs.first[p]]) + " to " +
+                 std::to_string(info.numbers[pairs.first[p] + pairs.apart]) + text(" the surface moves as in %.3g of the time stated", length) +
+                 (info.format == "FLIP Fluids cache" ? "; keep the cache's logs/ folder, which tells the times" : ""));
+            return;
+        }
+}
+
 }  // namespace
 
 VelocityFit check_velocity(const SequenceReader& reader, const std::function<void(const std::string&)>& warn) {
     const SequenceInfo& info = reader.info();
     VelocityFit fit;
     fit.meaning = info.velocity;
-    const size_t pairs = info.numbers.size() > 1 ? std::min(most_pairs, info.numbers.size() - 1) : 0;
-    if (info.velocity == VelocityMeaning::none || pairs == 0) return fit;
-    std::vector<std::unique_ptr<Mesh>> meshes;
-    std::vector<std::unique_ptr<SurfaceIndex>> indices;
-    std::vector<Moved> forward, backward;
-    std::vector<size_t> looked_at;  // the first frame of each pair
-    glm::vec3 lower(1e30f), upper(-1e30f);
-    for (size_t p = 0; p < pairs; ++p) {
-        const size_t k = (info.numbers.size() - 1) * (2 * p + 1) / (2 * pairs);
-        for (size_t i : {k, k + 1}) {
-            meshes.push_back(std::make_unique<Mesh>(reader.read(i)));
-            indices.push_back(std::make_unique<SurfaceIndex>(*meshes.back()));
-            for (const glm::vec3& x : meshes.back()->positions) lower = glm::min(lower, x), upper = glm::max(upper, x);
-        }
-        const Mesh &a = *meshes[2 * p], &b = *meshes[2 * p + 1];
-        if (a.triangles.empty() || b.triangles.empty()) continue;
-        const double seconds = info.seconds[k + 1] - info.seconds[k];
-        looked_at.push_back(k);
-        forward.push_back(moved(a, *indices[2 * p + 1], seconds));
-        backward.push_back(moved(b, *indices[2 * p], -seconds));
-    }
-    size_t samples = 0;
-    double still = 0;
-    for (const auto* all : {&forward, &backward})
-        for (const Moved& m : *all) samples += m.position.size(), still += m.still;
-    if (samples < fewest_samples) return fit;  // still water: nothing to learn, and nothing to lose
-    const Best ahead = best_factor(forward), back = best_factor(backward);
+    if (info.velocity == VelocityMeaning::none || info.numbers.size() < 2) return fit;
+    const Pairs pairs = telling_pairs(reader);
+    if (pairs.samples < fewest_samples) return fit;  // still water: nothing to learn, and nothing to lose
+    const Best ahead = best_factor(pairs.forward), back = best_factor(pairs.backward);
     // What the source states is right unless the frames say clearly otherwise.
     const double ahead_share = ahead.share * (info.velocity == VelocityMeaning::forward ? clearly : 1);
     const double back_share = back.share * (info.velocity == VelocityMeaning::backward ? clearly : 1);
     const bool is_back = back_share < ahead_share;
     const Best best = is_back ? back : ahead;
     const VelocityMeaning measured = is_back ? VelocityMeaning::backward : VelocityMeaning::forward;
-    const double plain = share(is_back ? backward : forward, 1);
-    fit.still = still / double(samples), fit.as_stored = plain * fit.still;
+    const std::vector<Moved>& moved = is_back ? pairs.backward : pairs.forward;
+    const double plain = share(moved, 1);
+    fit.still = pairs.still / double(pairs.samples), fit.as_stored = plain * fit.still;
     fit.carried = fit.as_stored;
+    const bool doubtful = pairs.apart > 1 && best.share > clearly_far;  // slow ripples turn about on so long a way
+    if (doubtful) return fit;
     fit.conclusive = best.share < 0.8;
     if (!fit.conclusive) {
         if (warn)
@@ -177,20 +211,13 @@ VelocityFit check_velocity(const SequenceReader& reader, const std::function<voi
     // A factor that is nearly 1 is 1: free fall between frames, solver walls and noise bend the fit.
     const bool fits = near(best.factor, 1) || plain < best.share + 0.1;
     std::string words;
-    const glm::vec3 size = upper - lower;
+    const glm::vec3 size = pairs.upper - pairs.lower;
     if (!fits) fit.factor = likely(best.factor, info.frames_per_second, std::max({size.x, size.y, size.z}), words);
     if (!fits) fit.carried = best.share * fit.still;
     if (!fits && warn)
         warn(info.path + ": the velocity fits when multiplied by " + text("%.4g", fit.factor) + " (" + text("%.3g mm", fit.carried * 1000) +
              " off instead of " + text("%.3g", fit.as_stored * 1000) + "): " + words);
-    for (size_t p = 0; p < looked_at.size(); ++p)
-        if (const double length = length_of((is_back ? backward : forward)[p], fit.factor); length != 1) {
-            if (warn)
-                warn(info.path + ": frames are unevenly spaced in time: from frame " + std::to_string(info.numbers[looked_at[p]]) + " to " +
-                     std::to_string(info.numbers[looked_at[p] + 1]) + text(" the surface moves as in %.3g of the time stated", length) +
-                     (info.format == "FLIP Fluids cache" ? "; keep the cache's logs/ folder, which tells the times" : ""));
-            break;
-        }
+    if (warn) warn_of_uneven_times(info, pairs, moved, fit.factor, warn);
     return fit;
 }
 

@@ -18,8 +18,8 @@ struct VelocityFit {
     double carried = 0;      ///< the same by the factor and meaning found
     bool conclusive = false; ///< enough moved, and the velocity explains it
 };
-/// Looks at up to four pairs of frames. Tells `warn` in one line what is wrong and what would be right.
-/// Deterministic; reads eight frames at most. Throws what the reader throws.
+/// Looks at up to four pairs of frames: neighbours, or up to 16 apart where less moves. Tells `warn` in one line what is
+/// wrong and what would be right. Deterministic; holds eight frames at most. Throws what the reader throws.
 VelocityFit check_velocity(const SequenceReader& reader, const std::function<void(const std::string&)>& warn);
 
 /// The reader with its velocities times fit.factor and its meaning replaced.

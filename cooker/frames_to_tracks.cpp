@@ -13,10 +13,16 @@ namespace {
 constexpr int coding_rounds = 2;
 constexpr int most_rounds = 8;  // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
-constexpr float mended = 2;                        // tolerances of error left by coding that bear a point
-constexpr float spur = 4;                          // tolerances that the decoded mesh may stand off the source
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
+
+/// What bears points.
+struct Births {
+    float error, spur;  ///< of the decoded field at the source's vertices, of the decoded mesh off the source: tolerances
+    float spur_room;    ///< beside spurs, of the usual least
+};
+constexpr Births growing{1, 4, 1};
+constexpr Births mending{2, 3, 0.5f};  // what coding leaves; the room at spurs: README.md, "Spurs"
 
 /// What a frame may lose when a point is taken away that its neighbours nearly make up for.
 struct Loss {
@@ -118,9 +124,10 @@ float spacing_at(const std::vector<SurfacePoint>& points, const VertexTree& tree
 
 /// Bears tracks where the frame misses the source; returns how many.
 size_t bear_tracks(Window& window, int sample, const Residual& residual, const std::vector<SurfacePoint>& points,
-                   const WindowGoal& goal, float threshold) {
+                   const WindowGoal& goal, const Births& rule) {
     const SurfaceFrame& frame = *window.frames[size_t(sample)];
-    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, threshold, goal.tolerance);
+    const std::vector<SurfacePoint> births =
+        choose_births(frame, residual, points, rule.error * goal.tolerance, goal.tolerance, rule.spur_room);
     std::vector<SurfacePoint> all = points;
     all.insert(all.end(), births.begin(), births.end());
     std::vector<glm::vec3> positions;
@@ -154,8 +161,8 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
         if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);
-        if (round == 0) mark_spurs(frame, sweep.points, spur * goal.tolerance, residual, goal.jobs);
-        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal, goal.tolerance);
+        if (round == 0) mark_spurs(frame, sweep.points, growing.spur * goal.tolerance, residual, goal.jobs);
+        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal, growing);
         last = born * enough <= sweep.points.size() || round + 1 == most_rounds;
         if (born == 0) break;
     }
@@ -182,8 +189,8 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         const SurfaceFrame& frame = *window.frames[size_t(s)];
         Residual residual = measure_residual(frame, points, goal.jobs);
-        mark_spurs(frame, points, spur * goal.tolerance, residual, goal.jobs);
-        bear_tracks(window, s, residual, points, goal, mended * goal.tolerance);
+        mark_spurs(frame, points, mending.spur * goal.tolerance, residual, goal.jobs);
+        bear_tracks(window, s, residual, points, goal, mending);
     }
 }
 

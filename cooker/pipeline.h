@@ -81,9 +81,10 @@ Surplus measure_places(const std::vector<SurfacePoint>& points, const std::vecto
 double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction);
 
 /// New points where |residual| exceeds `threshold`: worst first, no two closer than half the spacing of the points
-/// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to.
-std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual,
-                                        const std::vector<SurfacePoint>& points, float threshold, float tolerance);
+/// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to; beside spurs, than
+/// `spur_room` of that.
+std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
+                                        float threshold, float tolerance, float spur_room = 1);
 
 /// Carries the point to the next frame by the motion of the vertices of this one; empty where the surface leaves it.
 std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vector<glm::vec3>& motion, const SurfaceFrame& to,

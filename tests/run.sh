@@ -7,6 +7,8 @@ set -eu
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || set -- release asan tsan
 sh third_party/install.sh
+# Not everybody has it, so not everybody needs it; where it can be had its reader is tested, too.
+sh third_party/install.sh openvdb || echo "tests/run.sh: the OpenVDB reader is not tested" >&2
 command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
 
 # The thread sanitizer of GCC 12 cannot place its memory where newer kernels randomise more address bits.

@@ -423,6 +423,8 @@ TEST_CASE("OBJ") {
     CHECK(mesh.positions.size() == 4);
     CHECK(mesh.triangles == std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 1, 2}});
     CHECK(mesh.velocities.empty());
+    put_file(folder / "w1.obj", "v +0 0 0\r\nv +1e0 0 0\r\nv 1 +1. 0\r\nf 1 2 3\r\n");
+    CHECK(open_sequence(folder / "w1.obj", {})->read(0).triangles.size() == 1);
     put_file(folder / "w1.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9\n");
     CHECK_FAULT(fault(folder / "w1.obj"), "w1.obj");
     put_file(folder / "w1.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 -9\n");

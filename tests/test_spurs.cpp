@@ -86,4 +86,11 @@ TEST_CASE("at a spur a point is born where others would stand too close") {
     const std::vector<SurfacePoint> born = choose_births(frame, residual, points, 0.1f * frame.edge, 0.25f * frame.edge);
     REQUIRE(born.size() == 1);
     CHECK(born[0].position == frame.mesh.positions[vertex]);
+
+    // With one close by, only where the rule for spurs leaves so little room.
+    std::vector<SurfacePoint> close = points;
+    const glm::vec3 n = glm::normalize(frame.mesh.positions[vertex] + glm::vec3(0, 0, 1.2f * frame.edge));
+    close.push_back({radius * n, n, {}});
+    CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge).empty());
+    CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge, 0.5f).size() == 1);
 }

@@ -90,6 +90,24 @@ TEST_CASE("wrong units and signs: the likely factor") {
     }
 }
 
+TEST_CASE("slow liquid tells over several frames") {
+    std::string warning;
+    for (const float stored : {1.f, 1 / 120.f}) {
+        TestFolder folder;
+        for (int frame = 1; frame <= 20; ++frame) {
+            Mesh mesh = bumpy_sphere(16, 0.5f, {0, 0, -0.005f * float(frame)});  // a twentieth of an edge a frame
+            mesh.velocities.assign(mesh.positions.size(), {0, 0, -0.005f * 120 * stored});
+            put_file(folder / ("f" + std::to_string(frame) + ".ply"), plain_ply(mesh));
+        }
+        ReadOptions options;
+        options.frames_per_second = 120;
+        const VelocityFit fit = fit_of(*open_sequence(folder.path.string(), options), warning);
+        CHECK(fit.conclusive);
+        CHECK(fit.factor == doctest::Approx(1 / stored).epsilon(0.06));
+        CHECK(warning.empty() == (stored == 1));
+    }
+}
+
 TEST_CASE("frames that are not as far apart in time as stated") {
     TestFolder folder;  // frame 6 is taken half a frame early
     for (int frame = 3; frame <= 9; ++frame) {

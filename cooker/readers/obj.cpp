@@ -25,6 +25,7 @@ std::string_view take_word(std::string_view& line) {
 std::string quoted(std::string_view word) { return std::string("'").append(word.substr(0, 60)).append("'"); }
 template <class T>
 bool parse_all(std::string_view word, T& value) {
+    if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     return error == std::errc() && end == word.data() + word.size();
 }
