@@ -187,8 +187,9 @@ VelocityFit check_velocity(const SequenceReader& reader, const std::function<voi
     const Pairs pairs = telling_pairs(reader);
     if (pairs.samples < fewest_samples) return fit;  // still water: nothing to learn, and nothing to lose
     const Best ahead = best_factor(pairs.forward), back = best_factor(pairs.backward);
-    // What the source states is right unless the frames say clearly otherwise.
-    const double ahead_share = ahead.share * (info.velocity == VelocityMeaning::forward ? clearly : 1);
+    // What the source states is right unless the frames say clearly otherwise; a long way hardly tells directions apart.
+    const bool forward = info.velocity == VelocityMeaning::forward || (info.velocity == VelocityMeaning::unknown && pairs.apart > 1);
+    const double ahead_share = ahead.share * (forward ? clearly : 1);
     const double back_share = back.share * (info.velocity == VelocityMeaning::backward ? clearly : 1);
     const bool is_back = back_share < ahead_share;
     const Best best = is_back ? back : ahead;
