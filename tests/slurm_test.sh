@@ -86,10 +86,8 @@ set -- --frames 1:13 --error 1e --window 1
 "$rill" cook "$input" -o "$work/alone.rill" "$@" --quiet || [ $? -eq 3 ]
 cd "$work"
 RILL="$rill" SEGMENTS=3 sh "$here/../content/slurm/cook.sh" "$input" "$work/farm.rill" "$@"
-for _ in $(seq 120); do
-    [ -n "$(squeue --noheader)" ] || break
-    sleep 1
-done
+# Until nothing is left, or only what can never start.
+while squeue --noheader -o %r | grep -qv DependencyNeverSatisfied; do sleep 1; done
 cmp "$work/alone.rill" "$work/farm.rill" || {
     cat "$work"/*.log | tail -n 40
     exit 1
