@@ -27,9 +27,9 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
     return u2 < opposed_reach ? apart : 0.f;
 }
 
-/// The nearest point among those with weight: its normal, and the height above its plane. Keeps in the list who has
-/// weight anywhere, a good half of it; returns how many.
-RILL_INLINE uint32_t find_nearest(const Field& f, uint32_t* list, uint32_t count, Batch& b, float* height) {
+/// The nearest point among those with weight: its normal, the height above its plane and its 1/R². Keeps in the list who
+/// has weight anywhere, a good half of it; returns how many.
+RILL_INLINE uint32_t find_nearest(const Field& f, uint32_t* list, uint32_t count, Batch& b, float* height, float* inverse) {
     alignas(64) float best[lanes], least[lanes];
     alignas(64) uint32_t found[lanes];
     uint32_t kept = 0;
@@ -52,7 +52,7 @@ RILL_INLINE uint32_t find_nearest(const Field& f, uint32_t* list, uint32_t count
     for (uint32_t l = 0; l < lanes; ++l) {
         const Patch& p = f.patches[found[l]];
         b.u2[l] = least[l], b.nx[l] = p.nx, b.ny[l] = p.ny, b.nz[l] = p.nz;
-        height[l] = p.nx * (b.x[l] - p.x) + p.ny * (b.y[l] - p.y) + p.nz * (b.z[l] - p.z);
+        height[l] = p.nx * (b.x[l] - p.x) + p.ny * (b.y[l] - p.y) + p.nz * (b.z[l] - p.z), inverse[l] = p.inverse;
     }
     return kept;
 }
@@ -76,12 +76,33 @@ RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count,
     for (uint32_t l = 0; l < lanes; ++l) out[l] = side[l];
 }
 
+/// What all patches with weight say, whichever way they face: weight, moments of the value, and the weight of who says
+/// liquid; of cluster A how many. `inverse`: 1 / R² of the nearest.
+struct Opinions {
+    const float *all, *sum, *square, *inside, *voters, *inverse;
+};
+/// Bits of the lanes to ask the winding number for.
+RILL_INLINE uint32_t find_doubts(const Opinions& of, float trusted_value, Batch& b) {
+    alignas(64) float against[lanes], most[lanes];
+    for (uint32_t l = 0; l < lanes; ++l) against[l] = b.value[l] < 0 ? of.all[l] - of.inside[l] : of.inside[l];
+    for (uint32_t l = 0; l < lanes; ++l) most[l] = lesser(b.sign[l], b.value[l]) < 0 ? dispute : dispute_air;
+    alignas(64) uint32_t doubt[lanes];
+    for (uint32_t l = 0; l < lanes; ++l) {
+        const float size = b.value[l] < 0 ? -b.value[l] : b.value[l], u2 = b.u2[l], all = of.all[l], sum = of.sum[l];
+        const float variance = (of.square[l] * all - sum * sum) * of.inverse[l];  // all² times, in R²
+        const float split = against[l] * variance > most[l] * (all * all * all) ? u2 : 0.f;
+        const float unsure = of.voters[l] < enough_voters ? u2 : split, asked = size > trusted_value ? unsure : 0.f;
+        const float doubted = b.sign[l] == 0 ? unsupported : asked;
+        b.u2[l] = b.sign[l] == 0 ? unsupported : u2, doubt[l] = doubted > trusted ? bit_of_lane[l] : 0u;
+    }
+    return word_of(doubt);
+}
+
 RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, float trusted_value, Batch& b) {
-    alignas(64) float height[lanes], side[lanes] = {};
+    alignas(64) float height[lanes], inverse[lanes], side[lanes] = {};
     alignas(64) float weight_a[lanes] = {}, sum_a[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {};
-    alignas(64) float voters[lanes] = {};                   // of A: how many
-    alignas(64) float all[lanes] = {}, inside[lanes] = {};  // weight of all, whichever way they face, and of who says liquid
-    count = find_nearest(f, list, count, b, height);
+    alignas(64) float all[lanes] = {}, sum[lanes] = {}, square[lanes] = {}, inside[lanes] = {}, voters[lanes] = {};
+    count = find_nearest(f, list, count, b, height, inverse);
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];
         for (uint32_t l = 0; l < lanes; ++l) {
@@ -90,32 +111,27 @@ RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, floa
             const float u2 = (d2 + flatten * h * h) * p.inverse, w = weight_of(u2, p.activity);
             const float g = h + rx * (p.xx * rx + p.xy * ry + p.xz * rz) + ry * (p.yy * ry + p.yz * rz) + p.zz * rz * rz;
             const float agree = p.nx * b.nx[l] + p.ny * b.ny[l] + p.nz * b.nz[l], gate = gate_of(agree);
-            const float wa = w * (gate * gate), wb = weight_b_of(u2, w, agree);
-            weight_a[l] += wa, sum_a[l] += wa * g;
+            const float wa = w * (gate * gate), wb = weight_b_of(u2, w, agree), wg = w * g;
+            weight_a[l] += wa, sum_a[l] += wa * g, voters[l] += wa > 0 ? 1.f : 0.f;
             weight_b[l] += wb, sum_b[l] += wb * g;
-            voters[l] += wa > 0 ? 1.f : 0.f;
-            all[l] += w, inside[l] += g < 0 ? w : 0.f;
+            all[l] += w, sum[l] += wg, square[l] += wg * g, inside[l] += g < 0 ? w : 0.f;
         }
     }
     if (greatest_of(weight_b) > 0) find_side(f, list, count, b, height, side);
-    alignas(64) uint32_t doubt[lanes];
+    constexpr float least_weight = 1e-30f;
+    // A condition asked twice in a loop would become a branch.
+    alignas(64) float value_a[lanes], value_b[lanes], take[lanes];  // take > 0: cluster B
     for (uint32_t l = 0; l < lanes; ++l) {
-        const float weight = weight_a[l], some_a = weight > 0 ? weight : 1.f, some_b = weight_b[l] > 0 ? weight_b[l] : 1.f;
-        const float value_a = sum_a[l] / some_a, value_b = sum_b[l] / some_b, a = weight > 0 ? value_a : unsupported;
-        const float against = a < 0 ? all[l] - inside[l] : inside[l], few = a < 0 ? few_against : few_against_air;
-        const float votes = against <= few * all[l] ? voters[l] : 0.f;
+        const float mean_a = sum_a[l] / greater(weight_a[l], least_weight), mean_b = sum_b[l] / greater(weight_b[l], least_weight);
+        const float a = weight_a[l] > 0 ? mean_a : unsupported;
         // Thin liquid: intersection, max; thin air: union, min.
-        const float gain = side[l] < 0 ? value_b - a : a - value_b, better = weight > 0 ? gain : 1.f;
-        const float take = weight_b[l] > 0 ? better : 0.f;
-        const float value = take > 0 ? value_b : a, sign_a = weight > 0 ? 1.f : 0.f, sign = take > 0 ? -1.f : sign_a;
-        b.value[l] = value, b.weight[l] = take > 0 ? weight_b[l] : weight, b.sign[l] = sign;
-        const float size = value < 0 ? -value : value, u2 = b.u2[l];
-        const float unsure = votes >= enough_voters ? 0.f : u2, uneasy = take > 0 ? u2 : unsure;
-        const float asked = size > trusted_value ? uneasy : 0.f;
-        doubt[l] = asked > (value < 0 ? trusted : trusted_air) ? bit_of_lane[l] : 0u;
-        b.u2[l] = sign == 0 ? unsupported : u2;
+        const float gain = side[l] < 0 ? mean_b - a : a - mean_b;
+        value_a[l] = a, value_b[l] = mean_b, take[l] = weight_b[l] > 0 ? gain : 0.f;
     }
-    return word_of(doubt);
+    for (uint32_t l = 0; l < lanes; ++l) b.value[l] = take[l] > 0 ? value_b[l] : value_a[l];
+    for (uint32_t l = 0; l < lanes; ++l) b.weight[l] = take[l] > 0 ? weight_b[l] : weight_a[l];
+    for (uint32_t l = 0; l < lanes; ++l) b.sign[l] = take[l] > 0 ? -1.f : weight_a[l] > 0 ? 1.f : 0.f;
+    return find_doubts({all, sum, square, inside, voters, inverse}, trusted_value, b);
 }
 
 /// Of the chosen cluster: Σ w ∇G + ripple (G − value) ∇w, and Σ w v.

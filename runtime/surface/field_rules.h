@@ -17,14 +17,12 @@ namespace rill::surface {
 // wide patches of a calm far side would speak for fine surface nearby.
 constexpr float flatten = 3;
 // Where the nearest point is farther (in u²) than `trusted`, the winding number may overrule the blend if it is sure;
-// farther than `core` it need not even disagree. Liquid that is none, a fin where the plane of a rim goes on beyond its
-// sheet, is what it mostly finds: so where the blend says liquid, it is asked sooner.
-constexpr float core = 0.4f, trusted = 0.03f, trusted_air = 0.08f;
-// Nor is it asked where so many patches agree about the sign, but for a small share of the weight of all, whichever way
-// they face. (On a dam break it is asked at 22 of 100 positions farther than `trusted`, and overrules 95 of 100 of what it
-// would anywhere. With weights of the nearest one's face alone, .08 and 5 % for both: 13 and 80 of 100. What that leaves
-// standing off the source: cooker/README.md, "Spurs".)
-constexpr float enough_voters = 5, few_against = 0.01f, few_against_air = 0.05f;
+// farther than `core` it need not even disagree. It is asked where fewer than `enough_voters` patches of cluster A have a
+// say, and where patches contradict each other: the share of their weight that says otherwise, times the variance of what
+// they say (in R² of the nearest), is more than `dispute`. Liquid that is none, a fin where the plane of a rim goes on
+// beyond its sheet, is nine of ten of what it finds: so where the blend says air and has not taken cluster B, it is asked
+// more seldom. (cooker/README.md, "Spurs", has what less and more cost.)
+constexpr float core = 0.4f, trusted = 0.03f, enough_voters = 6, dispute = 2e-4f, dispute_air = 4e-3f;
 constexpr float sure = 0.2f, likely = 0.35f;  // of the winding number, from 0 or 1: to overrule within and beyond core
 // The clusters: bytes at equal p99 on five clips of three splashes, with neighbouring values. (.7, −.2 and R/1.4, so that
 // they hardly overlap, take 11 % more.)
