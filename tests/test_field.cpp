@@ -54,7 +54,7 @@ Surface plane_of(double half, double z, double up) {
     return [=](Random& random) { return Sample{{half * (2 * random() - 1), half * (2 * random() - 1), z}, {0, 0, up}}; };
 }
 
-/// A round sheet: what is within `half` of the disc of that radius at z = 0, and how far from it a place is.
+/// A round sheet: all that is within `half` of the disc of that radius at z = 0.
 Surface sheet_of(double radius, double half) {
     return [=](Random& random) {
         for (;;) {
@@ -70,6 +70,7 @@ Surface sheet_of(double radius, double half) {
         }
     };
 }
+/// Distance from it, negative inside.
 double outside_sheet(const Vec& p, double radius, double half) {
     return std::hypot(std::max(std::hypot(p[0], p[1]) - radius, 0.0), p[2]) - half;
 }
