@@ -11,7 +11,8 @@ namespace rill::cooker {
 namespace {
 
 constexpr int coding_rounds = 2;
-constexpr int most_rounds = 8;  // of births at one frame
+constexpr int last_mendings = 2;  // README.md, "Spurs"
+constexpr int most_rounds = 8;    // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
@@ -320,10 +321,12 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         });
         code(0);
     }
-    // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame.
-    const size_t corrected = window.paths.size();
-    mend(window, coded, goal);
-    code(corrected);
+    // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
+    for (int round = 0; round < last_mendings; ++round) {
+        const size_t mended = window.paths.size();
+        mend(window, coded, goal);
+        code(mended);
+    }
     for (const TrackSamples& drop : track_drops(window)) {
         coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));
         coded.decoded.push_back(dequantise_track(coded.tracks.back(), coded.quantiser, goal.origin, tables));

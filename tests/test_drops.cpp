@@ -82,13 +82,37 @@ TEST_CASE("with a wide tolerance the bumpy one is a drop as well; a mesh of drop
     CHECK(take_drops(alone, edge, edge).empty());
 }
 
-TEST_CASE("air that no cell shows is left out, liquid as small is not") {
-    const float radius = 0.2f * edge;
-    Mesh speck = sphere(8, radius, {0, 0, 0});
+TEST_CASE("a drop goes through the vertices of its piece, however few they are") {
+    Mesh coarse = sphere(5, 0.1f, {1, 2, 3});  // its volume is a quarter less than the ball's
+    const std::vector<Drop> drops = take_drops(coarse, edge, 0.5f * edge);
+    REQUIRE(drops.size() == 1);
+    const double product = double(drops[0].shape[0]) * drops[0].shape[1] * drops[0].shape[2];
+    CHECK(std::cbrt(product) == doctest::Approx(0.1).epsilon(0.02));
+}
+
+TEST_CASE("one vertex far off, and the piece is no drop") {
+    Mesh mesh = ellipsoid({}, {}), spiked = mesh;
+    const float tolerance = 0.1f * edge;
+    spiked.positions[0] *= 1 + 3 * tolerance / glm::length(spiked.positions[0]);
+    CHECK(take_drops(mesh, edge, tolerance).size() == 1);
+    CHECK(take_drops(spiked, edge, tolerance).empty());
+}
+
+TEST_CASE("air that no cell shows is a ball that one does, liquid as small is as it is") {
+    const glm::vec3 centre(1, 2, 3);
+    Mesh speck = sphere(8, 0.02f * edge, centre);
     Mesh drop = speck;
-    CHECK(take_drops(drop, edge, 0.2f * edge).size() == 1);
+    const std::vector<Drop> liquid = take_drops(drop, edge, 0.2f * edge);
+    REQUIRE(liquid.size() == 1);
+    CHECK(liquid[0].shape[0] == doctest::Approx(0.02 * edge).epsilon(0.1));
     for (Triangle& t : speck.triangles) std::swap(t[1], t[2]);
-    CHECK(take_drops(speck, edge, 0.2f * edge).empty());
+    speck.velocities.assign(speck.positions.size(), glm::vec3(4, 5, 6));
+    const std::vector<Drop> air = take_drops(speck, edge, 1e-4f * edge);
+    REQUIRE(air.size() == 1);
+    CHECK(glm::distance(air[0].centre, centre) < 0.01f * edge);
+    CHECK(glm::distance(air[0].velocity, glm::vec3(4, 5, 6)) < 1e-4f);
+    CHECK(air[0].volume == doctest::Approx(-0.1 * edge * edge * edge));
+    CHECK(air[0].shape[0] == doctest::Approx(-0.288 * edge).epsilon(0.01));
     CHECK(speck.triangles.empty());
     Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 2e-5f}}, {}, {}, {{0, 1, 2}, {1, 3, 2}}};  // open: no air, whatever its volume
     CHECK(take_drops(sheet, edge, edge).empty());
