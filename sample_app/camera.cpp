@@ -43,6 +43,16 @@ rill::View Camera::as_rill(int width, int height, const Bounds& scene) const {
     return out;
 }
 
+std::array<rill::View, 2> Camera::with_casters(int width, int height, const Bounds& scene, const glm::vec3& to_light) const {
+    const rill::View seen = as_rill(width, height, scene);
+    rill::View casters = seen;
+    casters.pixels_per_radian *= 0.5f;
+    // From what is seen towards the light one leaves through the planes that face away from it: those are moved out of the way.
+    for (auto& plane : casters.planes)
+        if (plane[0] * to_light.x + plane[1] * to_light.y + plane[2] * to_light.z < 0.0f) plane[3] += 8.0f * scene.diagonal();
+    return {seen, casters};
+}
+
 void Camera::look(const glm::vec3& eye, const glm::vec3& at) {
     const glm::vec3 offset = eye - at;
     target = at;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // An orbit camera over a z-up world, and what the runtime wants to know about it.
 #pragma once
+#include <array>
 #include <glm/glm.hpp>
 
 #include "rill/rill.h"
@@ -25,6 +26,8 @@ struct Camera {
     glm::mat4 projection(float aspect, const Bounds& scene) const;
     /// Frustum planes, eye and pixels per radian.
     rill::View as_rill(int width, int height, const Bounds& scene) const;
+    /// That, and a second view of all that may cast a shadow into it, half as fine. `to_light`: unit length.
+    std::array<rill::View, 2> with_casters(int width, int height, const Bounds& scene, const glm::vec3& to_light) const;
 
     /// Puts the eye there, looking at `target`.
     void look(const glm::vec3& eye, const glm::vec3& at);

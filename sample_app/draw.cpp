@@ -170,6 +170,7 @@ std::unique_ptr<Renderer> Renderer::create(std::string& cause) {
 Renderer::~Renderer() = default;
 
 const std::string& Renderer::description() const { return in_->description; }
+glm::vec3 Renderer::to_sun() const { return in_->sun; }
 
 void Renderer::set_scene(const Bounds& bounds) {
     in_->scene = bounds;

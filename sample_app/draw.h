@@ -56,6 +56,7 @@ public:
     void draw(const Camera& camera, const Look& look, int width, int height);
     Picture read_picture();                          ///< of the last draw()
     void present(int width, int height);             ///< the last draw() into the window
+    glm::vec3 to_sun() const;                        ///< unit length
     const std::string& description() const;          ///< API, version and device
 
 private:

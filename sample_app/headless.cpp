@@ -107,13 +107,13 @@ int Headless::start_renderer() {
 
 int Headless::decode(int number) {
     const uint32_t index = static_cast<uint32_t>(number - clip.info().first_frame);
-    const rill::View view = camera.as_rill(options.width, options.height, bounds);
+    const auto views = camera.with_casters(options.width, options.height, bounds, renderer->to_sun());
     rill::Frame frame{};
     frame.seconds = clip.frame_seconds(index);
     frame.rate = 1.0f;
     for (int i = 0; i < 3; ++i) frame.asset_to_world[5 * i] = 1.0f;
-    frame.views = &view;
-    frame.view_count = 1;
+    frame.views = views.data();
+    frame.view_count = uint32_t(views.size());
     frame.budget = make_budget(options.detail, clip.info());
     frame.wait_for_data = true;
     FrameRecord record{number, frame.seconds, 0.0, 0, 0, rill::Status::ok, {}};

@@ -163,13 +163,13 @@ void Window::save_picture(const std::string& path) {
 
 void Window::decode(int width, int height) {
     if (!controls.freeze_culling) culling_camera = camera;
-    const rill::View view = culling_camera.as_rill(width, height, bounds);
+    const auto views = culling_camera.with_casters(width, height, bounds, renderer->to_sun());
     rill::Frame frame{};
     frame.seconds = controls.clock.seconds;
     frame.rate = controls.clock.rate();
     for (int i = 0; i < 3; ++i) frame.asset_to_world[5 * i] = 1.0f;
-    frame.views = &view;
-    frame.view_count = 1;
+    frame.views = views.data();
+    frame.view_count = uint32_t(views.size());
     frame.budget = make_budget(controls.detail, clip.info());
     rill::Target* target = renderer->map(controls.look);
     frame.target = target;

@@ -162,6 +162,16 @@ TEST_CASE("decoded and source pictures are of the same thing") {
     CHECK(difference(early, source) > 2.0 * difference(left, source));
 }
 
+TEST_CASE("liquid out of sight casts its shadow into the picture") {
+    const std::string camera = "ball.rill --headless --size 320x180 --eye 0.44,-0.8,1.1 --target 0.44,-0.4,0.77 ";
+    REQUIRE(play(camera + "--frames 15 --out shadow.png").code == 0);
+    REQUIRE(play(camera + "--frames 15 --source frames/ball_%04d.ply --out wanted.png").code == 0);
+    REQUIRE(play(camera + "--frames 20 --source frames/ball_%04d.ply --out other.png").code == 0);
+    const Image wanted(bench().path("wanted.png"));
+    CHECK(difference(Image(bench().path("shadow.png")), wanted) < 1.5);
+    CHECK(difference(Image(bench().path("other.png")), wanted) > 3.0);  // there is a shadow, and it moves
+}
+
 TEST_CASE("every look draws something of its own") {
     std::vector<Image> images;
     for (const char* look : {"--shading water", "--shading clay", "--shading normals", "--shading velocity", "--wireframe",
