@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+// What decides a bit of the field, and what does not: candidates, batches, instruction sets, the order of points; and that
+// broken points and degenerate neighbourhoods leave every value finite.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include "field_harness.h"
+#include "surface/field_kernels.h"
+
+using namespace field_test;
+
+TEST_CASE("candidates beyond reach and the cut into batches change no bit") {
+    for (const bool far : {false, true}) {
+        CAPTURE(far);
+        Cloud cloud;
+        add(cloud, torus_of(1, 0.4), 0.12);
+        add(cloud, plane_of(1.5, 0.45, -1), 0.12);  // two clusters near the torus' top; open, so that winding wavers
+        Random random(11);
+        std::vector<Vec> positions;
+        if (far) {  // mostly beyond all supports
+            for (int i = 0; i < 2000; ++i) positions.push_back((0.5 + 2.5 * random()) * random.direction());
+        } else {
+            cloud.add_drop({0, 0, 0}, {0.2, 0.1, 0.15});
+            for (int i = 0; i < 101; ++i) positions.push_back({0.5 + 0.6 * random(), 0.5 * random(), 0.6 * random() - 0.1});
+            for (int i = 0; i < 20; ++i) positions.push_back(0.25 * random.direction());
+        }
+        const RealField real(cloud);
+        std::vector<uint32_t> everything(real.field.point_count + real.field.drop_count);
+        for (uint32_t i = 0; i < everything.size(); ++i) everything[i] = i;
+        const auto tight = candidates_of(real.field, box_of(positions));
+        CHECK((far || tight.size() < everything.size()));
+        CHECK(std::is_sorted(tight.begin(), tight.end()));
+        const std::vector<Value> values = evaluate(real.field, tight, positions, 10000);
+        CHECK(same_bits(values, evaluate(real.field, everything, positions, 10000)));
+        for (size_t batch : {1, 7, 32, 33, 64}) CHECK(same_bits(values, evaluate(real.field, everything, positions, batch)));
+        std::vector<Value> one_by_one;
+        for (const Vec& p : positions) one_by_one.push_back(evaluate(real.field, p));
+        CHECK(same_bits(values, one_by_one));
+    }
+}
+
+TEST_CASE("at the surface the blend stands; where it is far from zero it is asked and answered as elsewhere") {
+    Cloud cloud;
+    add(cloud, torus_of(1, 0.4), 0.12);
+    add(cloud, plane_of(1.5, 0.45, -1), 0.12);
+    const RealField real(cloud);
+    Random random(13);
+    size_t doubted = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const float x = float(3 * random() - 1.5), y = float(3 * random() - 1.5), z = float(1.4 * random() - 0.7);
+        const auto candidates = candidates_of(real.field, {{x, y, z}, {x, y, z}});
+        const auto count = uint32_t(candidates.size());
+        float all[4], near[4], blend[4];
+        surface::evaluate_gradient(real.field, candidates.data(), count, &x, &y, &z, 1, all, all + 1, all + 2, all + 3, nullptr);
+        surface::evaluate_at_surface(real.field, candidates.data(), count, &x, &y, &z, 1, near, near + 1, near + 2, near + 3, nullptr, 0.1f);
+        surface::evaluate_at_surface(real.field, candidates.data(), count, &x, &y, &z, 1, blend, blend + 1, blend + 2, blend + 3, nullptr, infinity);
+        const float* same = std::fabs(blend[0]) > 0.1f ? all : blend;
+        CHECK(std::memcmp(near, same, sizeof(near)) == 0);
+        doubted += all[0] != blend[0];
+    }
+    CHECK(doubted > 100);
+}
+
+TEST_CASE("every instruction set gives the bits of the scalar code") {
+    Cloud cloud;
+    add(cloud, torus_of(1, 0.4), 0.12);
+    add(cloud, plane_of(1.5, 0.45, -1), 0.12);
+    RealField real(cloud);
+    Random random(12);
+    std::vector<Vec> positions;
+    for (int i = 0; i < 1000; ++i) positions.push_back({3 * random() - 1.5, 3 * random() - 1.5, 1.4 * random() - 0.7});
+    const surface::Kernels* levels[surface::most_kernel_levels];
+    const uint32_t count = surface::kernel_levels(levels);
+    REQUIRE(count > 0);
+    CHECK(real.field.kernels == levels[count - 1]);
+    real.field.kernels = levels[0];
+    const std::vector<Value> reference = evaluate(real.field, positions);
+    for (uint32_t k = 1; k < count; ++k) {
+        CAPTURE(levels[k]->name);
+        real.field.kernels = levels[k];
+        CHECK(same_bits(reference, evaluate(real.field, positions)));
+    }
+}
+
+TEST_CASE("gather: tells how many there are, and never writes beyond its room") {
+    Cloud cloud;
+    add(cloud, sphere_of(1), 0.2);
+    cloud.add_drop({0, 0, 0}, {0.2, 0.2, 0.2});
+    const RealField real(cloud);
+    const surface::Box box{{-0.2f, -0.2f, 0.f}, {0.2f, 0.2f, 1.f}};
+    const auto all = candidates_of(real.field, box);
+    REQUIRE(all.size() > 10);
+    CHECK(all.back() == real.field.point_count);
+    for (uint32_t room : {0u, 1u, 5u, uint32_t(all.size()) - 1, uint32_t(all.size())}) {
+        std::vector<uint32_t> some(room + 1, 12345);
+        CHECK(surface::gather(real.field, box, some.data(), room) == all.size());
+        CHECK(std::equal(all.begin(), all.begin() + room, some.begin()));
+        CHECK(some[room] == 12345);
+    }
+}
+
+TEST_CASE("the order of the points changes nothing but rounding, the number of fitting ranges not even that") {
+    Cloud cloud, reversed;
+    const auto samples = poisson_disk(torus_of(1, 0.4), 0.15, 1);
+    for (const Sample& s : samples) cloud.add(s.position, s.normal);
+    for (size_t i = samples.size(); i-- > 0;) reversed.add(samples[i].position, samples[i].normal);
+    RealField one(cloud);
+    const RealField other(reversed);
+    Random random(2);
+    std::vector<Vec> positions;
+    for (int i = 0; i < 200; ++i) positions.push_back(torus_of(1, 0.4)(random).position);
+    const auto a = evaluate(one.field, positions), b = evaluate(other.field, positions);
+    for (size_t i = 0; i < a.size(); ++i) CHECK(std::fabs(a[i].value - b[i].value) < 1e-6);
+    for (uint32_t first = 0; first < one.field.point_count; first += 17)
+        surface::fit_patches(one.field, first, std::min(first + 17, one.field.point_count));
+    CHECK(same_bits(a, evaluate(one.field, positions)));
+}
+
+TEST_CASE("degenerate neighbourhoods: every value and gradient finite") {
+    const auto point = [](Cloud& c, double x, double y, double z, const Vec& n = {0, 0, 1}) { c.add({x, y, z}, n); };
+    std::vector<Cloud> clouds(14);
+    point(clouds[1], 0, 0, 0);
+    for (int i = 0; i < 2; ++i) point(clouds[2], 0.1 * i, 0, 0);
+    for (int i = 0; i < 3; ++i) point(clouds[3], 0.1 * i, 0.1 * (i % 2), 0);
+    for (int i = 0; i < 20; ++i) point(clouds[4], 0.05 * i, 0, 0);                       // a line
+    for (int i = 0; i < 20; ++i) point(clouds[5], 0, 0, 0.05 * i);                       // along the normal
+    for (int i = 0; i < 20; ++i) point(clouds[6], 0, 0, 0);                              // one place
+    for (int i = 0; i < 20; ++i) point(clouds[7], 0.1 * (i % 5), 0.1 * (i / 5 % 2), 0);  // pairs
+    for (int i = 0; i < 20; ++i) point(clouds[8], 0.1 * i, 0, 0, {0, 0, 0});             // no normal
+    for (int i = 0; i < 20; ++i) point(clouds[9], 1e-12 * i, 0, 0);
+    for (int i = 0; i < 20; ++i) point(clouds[10], 1e6 * i, 1e6 * (i % 3), 0);
+    for (int i = 0; i < 20; ++i) point(clouds[11], 0.1 * (i % 4), 0.1 * (i / 4), 0, {0, 0, i % 2 ? 1.0 : -1.0});
+    for (int i = 0; i < 20; ++i) point(clouds[12], i == 7 ? not_a_number : 0.1 * (i % 4), 0.1 * (i / 4), i == 3 ? infinity : 0);
+    point(clouds[13], 0, 0, 0), point(clouds[13], 1e9, 0, 0);
+    for (size_t i = 0; i < clouds.size(); ++i) {
+        CAPTURE(i);
+        const RealField real(clouds[i]);
+        CHECK(real.field.point_count == clouds[i].activity.size() - (i == 12 ? 2 : 0));
+        Random random(i + 1);
+        std::vector<Vec> positions = {{0, 0, 0}, {1e8, 0, 0}, {0, 0, 1e-12}};
+        for (int k = 0; k < 200; ++k) positions.push_back((k % 2 ? 0.05 : 0.5) * random.direction() + Vec{random(), 0, 0});
+        int broken = 0;
+        for (const Value& v : evaluate(real.field, positions))
+            for (float f : {v.value, v.gradient[0], v.gradient[1], v.gradient[2], v.velocity[0]}) broken += !std::isfinite(f);
+        CHECK(broken == 0);
+    }
+}
+
+TEST_CASE("points that are broken or absent are not there") {
+    Cloud cloud;
+    add(cloud, sphere_of(1), 0.2);
+    const size_t whole = cloud.activity.size();
+    cloud.add({not_a_number, 0, 0}, {0, 0, 1});
+    cloud.add({0, 0, 2}, {0, not_a_number, 1});
+    cloud.add({0, 0, 2}, {0, 0, 1}), cloud.activity.back() = 0;
+    cloud.add({0, 0, 2}, {0, 0, 1}), cloud.activity.back() = not_a_number;
+    cloud.add_drop({0, 0, 0}, {0.1, 0.1, 0}), cloud.add_drop({0, not_a_number, 0}, {0.1, 0.1, 0.1}), cloud.add_drop({0, 0, 0}, {0.1, 0.1, -0.1});
+    const RealField real(cloud);
+    CHECK(real.field.point_count == whole);
+    CHECK(real.field.drop_count == 0);
+}
