@@ -2,6 +2,7 @@
 // The error metric: one definition for the closed loop of the cooker, `rill verify` and `rill compare`.
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "mesh.h"
@@ -11,7 +12,7 @@ namespace rill::cooker {
 /// Bounding volume hierarchy over the triangles of a mesh; read only after construction, thread safe.
 class SurfaceIndex {
 public:
-    explicit SurfaceIndex(const Mesh& mesh);  ///< keeps a reference
+    explicit SurfaceIndex(const Mesh& mesh, int jobs = 1);  ///< keeps a reference
     ~SurfaceIndex();
     SurfaceIndex(SurfaceIndex&&) noexcept;
     struct Hit {
@@ -24,7 +25,7 @@ public:
     const Mesh& mesh() const;
 private:
     struct Impl;
-    Impl* impl_;
+    std::unique_ptr<Impl> impl_;
 };
 
 struct Topology {

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 
+#include "parallel.h"
 #include "surface_distance.h"
 
 namespace rill::cooker {
 namespace {
 
 constexpr uint32_t leaf_size = 4;
+constexpr uint32_t worth_sharing = 8192;  // triangles
 constexpr uint32_t leaf_bit = 0x80000000u;  // child = leaf_bit | first triangle << 3 | count, else a node
 constexpr uint32_t no_child = leaf_bit;     // a leaf of no triangles
 
@@ -87,30 +89,42 @@ struct SurfaceIndex::Impl {
                          });
         return middle;
     }
-    uint32_t build(uint32_t first, uint32_t last) {
+    /// Appends the tree over triangles [first, last) to `out`: a node, then its branches; the same whatever `jobs` is.
+    uint32_t build(std::vector<Node>& out, uint32_t first, uint32_t last, int jobs) {
         const uint32_t middle = split(first, last);
         const uint32_t cuts[5] = {first, split(first, middle), middle, split(middle, last), last};
-        const uint32_t self = uint32_t(nodes.size());
-        nodes.emplace_back();
+        const bool shared = threads_of(jobs) > 1 && last - first >= worth_sharing;
+        std::vector<Node> branches[4];
+        if (shared) parallel_for(4, jobs, [&](size_t k) { build(branches[k], cuts[k], cuts[k + 1], 1); });
+        const uint32_t self = uint32_t(out.size());
+        out.emplace_back();
         for (int k = 0; k < 4; ++k) {
             const uint32_t count = cuts[k + 1] - cuts[k];
             const Box box = bounds(cuts[k], cuts[k + 1]);
             const uint32_t child = count == 0           ? no_child
                                    : count <= leaf_size ? leaf_bit | cuts[k] << 3 | count
-                                                        : build(cuts[k], cuts[k + 1]);
-            nodes[self].child[k] = child;
-            for (int a = 0; a < 3; ++a) nodes[self].lower[a][k] = box.lower[a], nodes[self].upper[a][k] = box.upper[a];
+                                   : shared             ? append(out, branches[k])
+                                                        : build(out, cuts[k], cuts[k + 1], 1);
+            out[self].child[k] = child;
+            for (int a = 0; a < 3; ++a) out[self].lower[a][k] = box.lower[a], out[self].upper[a][k] = box.upper[a];
         }
         return self;
     }
+    static uint32_t append(std::vector<Node>& out, const std::vector<Node>& branch) {
+        const uint32_t base = uint32_t(out.size());
+        for (Node node : branch) {
+            for (uint32_t& child : node.child)
+                if (!(child & leaf_bit)) child += base;
+            out.push_back(node);
+        }
+        return base;
+    }
 };
 
-SurfaceIndex::SurfaceIndex(const Mesh& mesh) : impl_(new Impl{&mesh, {}, {}, {}, {}}) {
+SurfaceIndex::SurfaceIndex(const Mesh& mesh, int jobs) : impl_(new Impl{&mesh, {}, {}, {}, {}}) {
     const uint32_t count = uint32_t(mesh.triangles.size());
-    if (count >= leaf_bit >> 3) {
-        delete impl_;
+    if (count >= leaf_bit >> 3)
         throw InputError("a frame of " + std::to_string(count) + " triangles is more than this version can index");
-    }
     if (count == 0) return;
     impl_->triangles.resize(count);
     impl_->centres.resize(count);
@@ -120,7 +134,7 @@ SurfaceIndex::SurfaceIndex(const Mesh& mesh) : impl_(new Impl{&mesh, {}, {}, {},
         impl_->centres[i] = mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
     }
     impl_->nodes.reserve(count / 4 + 4);
-    impl_->build(0, count);
+    impl_->build(impl_->nodes, 0, count, jobs);
     impl_->centres = {};
     impl_->corners.reserve(count);
     for (uint32_t i : impl_->triangles) {
@@ -128,8 +142,8 @@ SurfaceIndex::SurfaceIndex(const Mesh& mesh) : impl_(new Impl{&mesh, {}, {}, {},
         impl_->corners.push_back({mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]});
     }
 }
-SurfaceIndex::~SurfaceIndex() { delete impl_; }
-SurfaceIndex::SurfaceIndex(SurfaceIndex&& other) noexcept : impl_(other.impl_) { other.impl_ = nullptr; }
+SurfaceIndex::~SurfaceIndex() = default;
+SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;
 const Mesh& SurfaceIndex::mesh() const { return *impl_->mesh; }
 
 SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most) const {

@@ -47,7 +47,7 @@ struct Target {
     const Mesh& mesh;
     SurfaceIndex index;
     std::vector<glm::vec3> normals;
-    explicit Target(const Mesh& to) : mesh(to), index(to), normals(vertex_normals(to)) {}
+    Target(const Mesh& to, int jobs) : mesh(to), index(to, jobs), normals(vertex_normals(to)) {}
 };
 
 glm::vec3 at(const SurfaceIndex::Hit& hit, const Triangle& t, const std::vector<glm::vec3>& values) {
@@ -70,7 +70,7 @@ std::vector<Pull> find_pulls(const Mesh& from, const Target& to, const std::vect
         if (glm::dot(n, normals[i]) > alike) pulls[i].add(hit.point - moved.positions[i], n, 1);
     });
     // What the next surface has and nothing of this one goes to: crowns and fingers as they shoot out.
-    const SurfaceIndex moved_index(moved);
+    const SurfaceIndex moved_index(moved, jobs);
     std::vector<SurfaceIndex::Hit> hits((to.mesh.positions.size() + stride - 1) / stride);
     for_each(hits.size(), jobs, [&](size_t k) { hits[k] = moved_index.closest(to.mesh.positions[k * stride], reach); });
     for (size_t k = 0; k < hits.size(); ++k) {
@@ -124,7 +124,7 @@ std::vector<glm::vec3> surface_motion(const Mesh& from, const Mesh& to, int jobs
     motion.resize(from.positions.size(), glm::vec3(0));
     if (from.triangles.empty() || to.triangles.empty()) return motion;
     const Neighbours neighbours(from);
-    const Target target(to);
+    const Target target(to, jobs);
     const float edge = median_edge(from);
     struct Step {
         float stiffness;
@@ -145,7 +145,7 @@ std::vector<glm::vec3> motion_goes_on(const Mesh& before, const std::vector<glm:
     Mesh moved;
     moved.triangles = before.triangles, moved.positions = before.positions;
     for (size_t i = 0; i < motion.size(); ++i) moved.positions[i] += motion[i];
-    const SurfaceIndex index(moved);
+    const SurfaceIndex index(moved, jobs);
     const float near = reach * median_edge(now);
     for_each(next.size(), jobs, [&](size_t i) {
         const SurfaceIndex::Hit hit = index.closest(now.positions[i], near);

@@ -67,6 +67,22 @@ TEST_CASE("closest point equals brute force, also on slivers and degenerate tria
     }
 }
 
+TEST_CASE("an index built by many threads answers as one built by one") {
+    const Mesh mesh = sphere(120, 1, {0.3f, 0, 0});  // with corners that many triangles share: equals must be told apart alike
+    REQUIRE(mesh.triangles.size() > 10000);
+    const SurfaceIndex alone(mesh);
+    for (int jobs : {2, 8}) {
+        const SurfaceIndex index(mesh, jobs);
+        for (size_t i = 0; i < mesh.positions.size(); i += 3) {
+            const glm::vec3 x = 1.1f * mesh.positions[i];
+            const SurfaceIndex::Hit a = alone.closest(x, infinity), b = index.closest(x, infinity);
+            REQUIRE(a.triangle == b.triangle);
+            REQUIRE(a.point == b.point);
+            REQUIRE(a.barycentric == b.barycentric);
+        }
+    }
+}
+
 TEST_CASE("many triangles in one place do not unbalance the tree") {
     Mesh mesh;
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

@@ -149,6 +149,7 @@ int bench_command(const BenchOptions& options) {
     std::vector<Pass> passes, details;
     nlohmann::json memory;
     std::vector<ScreenError> far;
+    CameraJumps camera;
     DracoRate draco;
     double file_bytes = double(directory.header.file_bytes), bytes_read = 0;
     for (int jobs = 1; jobs <= most_jobs; ++jobs) {
@@ -170,6 +171,7 @@ int bench_command(const BenchOptions& options) {
         memory = {{"allocations_until_created", at_start}, {"peak_bytes", player.peak_bytes()}};
         draco = draco_rate(player, frames);
         far = screen_errors(player, frames);
+        camera = camera_jumps(player, frames);
     }
     bool same = true;
     uint64_t frame_allocations = 0;
@@ -201,6 +203,8 @@ int bench_command(const BenchOptions& options) {
         {"passes", list},
         {"scaling", scaling},
         {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
+        {"camera_jumps",
+         {{"moves", camera.moves}, {"changes", camera.changes}, {"mean_pixels", camera.mean}, {"p99_pixels", camera.p99}, {"max_pixels", camera.max}, {"above_share", camera.above}}},
         {"draco",
          {{"bits", 10},
           {"speed", 0},
@@ -219,6 +223,8 @@ int bench_command(const BenchOptions& options) {
         for (const ScreenError& e : far)
             std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
                         double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.mean, e.p99, e.max);
+        std::printf("moving away from 1 to 8 diagonals: %u of %u moves change the surface, by %.2f pixels on average, p99 %.2f, max %.1f; %.3f %% of it by more than %g\n",
+                    camera.changes, camera.moves, camera.mean, camera.p99, camera.max, 100 * camera.above, double(pixel_error_asked));
         if (draco_rate > 0)
             std::printf("Draco decodes the same meshes at %.2f Mtri/s (10 bits, one core, processor time): Rill runs at %.2f times that\n", draco_rate / 1e6,
                         rill_rate / draco_rate);

@@ -16,6 +16,16 @@ struct ScreenError {
     double mean = 0, p99 = 0, max = 0;    ///< pixels
     double triangles = 0;                 ///< share of those at the source's resolution
 };
+/// What jumps when cells and layers change under a camera that moves away, the liquid standing still; over the vertices of the
+/// surfaces before and after each change, each to the other surface, in pixels at that place.
+struct CameraJumps {
+    uint32_t moves = 0, changes = 0;      ///< of the camera; those that changed the surface
+    double mean = 0, p99 = 0, max = 0;    ///< pixels
+    double above = 0;                     ///< share of the vertices that jump by more than pixel_error_asked
+};
+/// From 1 to 8 diagonals, by a thirtieth of the distance a move, at most three of the frames.
+CameraJumps camera_jumps(BenchPlayer& player, const std::vector<uint32_t>& frames);
+
 /// At 1, 2, 4, … diagonals, on at most eight of the frames.
 std::vector<ScreenError> screen_errors(BenchPlayer& player, const std::vector<uint32_t>& frames);
 
