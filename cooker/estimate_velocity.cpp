@@ -25,7 +25,8 @@ public:
         if (info_.seconds.size() < 2 || mesh.triangles.empty()) return mesh;
         const size_t other = neighbour(index);
         const double seconds = info_.seconds[other] - info_.seconds[index];  // negative at the end
-        mesh.velocities = surface_motion(mesh, source_->read_surface(other), 1);
+        const Mesh next = source_->read_surface(other);
+        mesh.velocities = surface_motion(SurfaceIndex(mesh), SurfaceIndex(next), 1);
         for (glm::vec3& v : mesh.velocities) v *= float(1 / seconds);
         return mesh;
     }

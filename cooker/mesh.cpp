@@ -6,6 +6,11 @@
 
 namespace rill::cooker {
 
+glm::vec3 unit_normal(const glm::vec3& area) {
+    const double length = glm::length(glm::dvec3(area));  // squares of tiny areas underflow in float
+    return length > 0 ? glm::vec3(glm::dvec3(area) / length) : glm::vec3(0);
+}
+
 std::vector<glm::vec3> vertex_normals(const Mesh& mesh) {
     std::vector<glm::vec3> normals(mesh.positions.size(), glm::vec3(0));
     for (const Triangle& t : mesh.triangles) {
@@ -14,10 +19,7 @@ std::vector<glm::vec3> vertex_normals(const Mesh& mesh) {
         const glm::vec3 face = glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a);
         for (uint32_t v : t) normals[v] += face;
     }
-    for (glm::vec3& n : normals) {
-        const double length = glm::length(glm::dvec3(n));  // squares of tiny areas underflow in float
-        n = length > 0 ? glm::vec3(glm::dvec3(n) / length) : glm::vec3(0);
-    }
+    for (glm::vec3& n : normals) n = unit_normal(n);
     return normals;
 }
 

@@ -28,6 +28,8 @@ struct UsageError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// Direction of an area vector; zero if it has none.
+glm::vec3 unit_normal(const glm::vec3& area);
 /// Area-weighted vertex normals (unit; zero where no triangle gives one).
 std::vector<glm::vec3> vertex_normals(const Mesh& mesh);
 /// Per vertex a third of the area of its triangles, m².

@@ -82,14 +82,19 @@ Past past_of(const Window& window) {
 /// Fills in the liquid's own motion, if the whole window is calm enough for points to go with it.
 bool go_with_liquid(Window& window, int jobs) {
     std::vector<std::vector<glm::vec3>> motion(window.frames.size() - 1);
+    const double steps = double(motion.size());
     double stretch = 0, miss = 0;
     for (size_t s = 0; s < motion.size(); ++s) {
         const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
         motion[s] = liquid_motion(from.mesh, to.mesh, to.index, window.seconds[s + 1] - window.seconds[s], jobs);
-        stretch += mean_stretch(from.mesh, motion[s]) / double(motion.size());
-        miss += mean_miss(from.mesh, motion[s], to.index, 2 * to.edge, jobs) / to.edge / double(motion.size());
+        stretch += mean_stretch(from.mesh, motion[s]);
+        if (stretch > most_stretch * steps) return false;
     }
-    if (stretch > most_stretch || miss > most_miss) return false;
+    for (size_t s = 0; s < motion.size(); ++s) {
+        const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
+        miss += mean_miss(from.mesh, motion[s], to.index, 2 * to.edge, jobs) / to.edge;
+    }
+    if (miss > most_miss * steps) return false;
     window.motion = std::move(motion);
     return true;
 }
@@ -99,11 +104,11 @@ void find_motion(Window& window, Past past, bool known, int jobs) {
     if (known && go_with_liquid(window, jobs)) return;
     window.slips = known;
     for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
-        const Mesh &from = window.frames[s]->mesh, &to = window.frames[s + 1]->mesh;
+        const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
         const double seconds = window.seconds[s + 1] - window.seconds[s];
         std::vector<glm::vec3> start;
-        if (past.frame) start = motion_goes_on(past.frame->mesh, past.motion, from, float(seconds / past.seconds), jobs);
-        past = {window.frames[s], window.frames[s + 1], surface_motion(from, to, jobs, std::move(start)), seconds};
+        if (past.frame) start = motion_goes_on(past.frame->index, past.motion, from.mesh, float(seconds / past.seconds), jobs);
+        past = {window.frames[s], window.frames[s + 1], surface_motion(from.index, to.index, jobs, std::move(start)), seconds};
         window.motion.push_back(past.motion);
     }
 }

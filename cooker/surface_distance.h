@@ -13,6 +13,9 @@ namespace rill::cooker {
 class SurfaceIndex {
 public:
     explicit SurfaceIndex(const Mesh& mesh, int jobs = 1);  ///< keeps a reference
+    /// Of a mesh with the same triangles whose vertices have moved: takes over how `before` divides them, in a fraction of
+    /// the time; the farther they went apart, the slower are queries.
+    SurfaceIndex(const Mesh& moved, const SurfaceIndex& before, int jobs);
     ~SurfaceIndex();
     SurfaceIndex(SurfaceIndex&&) noexcept;
     struct Hit {
@@ -22,6 +25,7 @@ public:
         glm::vec3 barycentric{};   ///< of the hit in the triangle
     };
     Hit closest(const glm::vec3& x, float at_most) const;  ///< at_most: give up beyond (inf: never)
+    bool within(const glm::vec3& x, float distance) const;  ///< closest(x, distance).distance < distance, in less time
     const Mesh& mesh() const;
 private:
     struct Impl;

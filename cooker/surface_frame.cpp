@@ -52,7 +52,7 @@ void place_probes(SurfaceFrame& frame) {
                 const float away = edges * frame.edge;
                 const glm::vec3 x = frame.mesh.positions[v] + away * frame.mesh.normals[v];
                 const float clear = 0.7f * std::fabs(away);
-                if (frame.index.closest(x, clear).distance < clear) continue;
+                if (frame.index.within(x, clear)) continue;
                 frame.probes.push_back({x, v, away > 0});
             }
         }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Closest point on a triangle mesh: a four-wide tree of boxes, split at the median of the longest axis, so
 // that its depth is bounded whatever the input. The boxes of a node's children lie side by side in arrays
-// of four: the distances to all of them cost one vectorised loop.
+// of four, and so do the triangles of a leaf: the distances to all of them cost one vectorised loop.
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <limits>
 
@@ -12,21 +13,28 @@
 namespace rill::cooker {
 namespace {
 
-constexpr uint32_t leaf_size = 4;
+constexpr uint32_t lanes = 4;               // children of a node, triangles of a leaf
 constexpr uint32_t worth_sharing = 8192;  // triangles
-constexpr uint32_t leaf_bit = 0x80000000u;  // child = leaf_bit | first triangle << 3 | count, else a node
-constexpr uint32_t no_child = leaf_bit;     // a leaf of no triangles
+constexpr uint32_t leaf_bit = 0x80000000u;  // child = leaf_bit | leaf, else a node
+constexpr uint32_t no_child = ~0u;
 
+using Lanes = float __attribute__((vector_size(lanes * sizeof(float))));
 struct Node {
-    float lower[3][4], upper[3][4];
-    uint32_t child[4];
+    Lanes lower[3], upper[3];
+    uint32_t child[lanes];
+};
+/// Triangles a, a + b, a + c; what is over repeats the last.
+struct Leaf {
+    Lanes a[3], b[3], c[3];
+    uint32_t triangle[lanes];
 };
 struct Corners {
     glm::vec3 a, b, c;
 };
 struct Box {
     glm::vec3 lower{std::numeric_limits<float>::infinity()}, upper{-std::numeric_limits<float>::infinity()};
-    void add(const glm::vec3& x) { lower = glm::min(lower, x), upper = glm::max(upper, x); }
+    void add(const Box& b) { lower = glm::min(lower, b.lower), upper = glm::max(upper, b.upper); }
+    void add(const glm::vec3& x) { add(Box{x, x}); }
 };
 
 /// Closest point to the origin of a triangle as barycentric coordinates (Ericson, Real-Time Collision
@@ -60,28 +68,56 @@ glm::vec3 closest_barycentric(const Corners& t) {
     return {va / sum, vb / sum, vc / sum};
 }
 
+Lanes lesser(Lanes a, Lanes b) { return a < b ? a : b; }
+Lanes greater(Lanes a, Lanes b) { return a > b ? a : b; }
+
+/// Squared distances of x from the boxes of a node.
+Lanes squared_distances(const Node& node, const glm::vec3& x) {
+    Lanes sum{};
+    for (int d = 0; d < 3; ++d) {
+        const Lanes out = greater(greater(node.lower[d] - x[d], x[d] - node.upper[d]), Lanes{});
+        sum += out * out;
+    }
+    return sum;
+}
+
+/// Squared distances of x from the triangles of a leaf: from the nearest edge or, over the inside, from the plane. Whatever
+/// rounding makes of a sliver, some point of the triangle has that distance.
+Lanes squared_distances(const Leaf& leaf, const glm::vec3& x) {
+    const Lanes ax = leaf.a[0] - x.x, ay = leaf.a[1] - x.y, az = leaf.a[2] - x.z;
+    const Lanes bx = leaf.b[0], by = leaf.b[1], bz = leaf.b[2], cx = leaf.c[0], cy = leaf.c[1], cz = leaf.c[2];
+    const Lanes bb = bx * bx + by * by + bz * bz, bc = bx * cx + by * cy + bz * cz, cc = cx * cx + cy * cy + cz * cz;
+    const Lanes ab = -(ax * bx + ay * by + az * bz), ac = -(ax * cx + ay * cy + az * cz);
+    const auto from = [&](Lanes v, Lanes w) {  // a + v b + w c
+        const Lanes px = ax + v * bx + w * cx, py = ay + v * by + w * cy, pz = az + v * bz + w * cz;
+        return px * px + py * py + pz * pz;
+    };
+    const Lanes none{}, one = none + 1, least = none + FLT_MIN;
+    const auto along = [&](Lanes dot, Lanes length2) { return lesser(greater(dot / greater(length2, least), none), one); };
+    const Lanes across = along(cc - bc + ab - ac, bb - 2 * bc + cc);
+    const Lanes edges = lesser(lesser(from(along(ab, bb), none), from(none, along(ac, cc))), from(across, one - across));
+    const Lanes v = cc * ab - bc * ac, w = bb * ac - bc * ab, all = bb * cc - bc * bc, scale = one / greater(all, least);
+    const Lanes inside = from(v * scale, w * scale);
+    return (v >= none) & (w >= none) & (v + w <= all) & (inside < edges) ? inside : edges;
+}
+
 }  // namespace
 
 struct SurfaceIndex::Impl {
     const Mesh* mesh;
     std::vector<Node> nodes;
-    std::vector<Corners> corners;      // in the order of the leaves
-    std::vector<uint32_t> triangles;   // corners[i] is triangle triangles[i] of the mesh
-    std::vector<glm::vec3> centres;    // of triangles, while building
+    std::vector<Leaf> leaves;
+    // While building:
+    std::vector<uint32_t> triangles;   // in the order of the leaves
+    std::vector<glm::vec3> centres;    // of triangles
 
-    Box bounds(uint32_t first, uint32_t last) const {
-        Box box;
-        for (uint32_t i = first; i < last; ++i)
-            for (uint32_t v : mesh->triangles[triangles[i]]) box.add(mesh->positions[v]);
-        return box;
-    }
     uint32_t split(uint32_t first, uint32_t last) {
-        if (last - first <= leaf_size) return last;
+        if (last - first <= lanes) return last;
         Box box;
         for (uint32_t i = first; i < last; ++i) box.add(centres[triangles[i]]);
         const glm::vec3 size = box.upper - box.lower;
         const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        const uint32_t middle = first + (last - first) / 2;
+        const uint32_t middle = first + ((last - first) / 2 + lanes - 1) / lanes * lanes;  // leaves are full
         std::nth_element(triangles.begin() + first, triangles.begin() + middle, triangles.begin() + last,
                          [&](uint32_t i, uint32_t j) {
                              return centres[i][axis] != centres[j][axis] ? centres[i][axis] < centres[j][axis]
@@ -89,7 +125,8 @@ struct SurfaceIndex::Impl {
                          });
         return middle;
     }
-    /// Appends the tree over triangles [first, last) to `out`: a node, then its branches; the same whatever `jobs` is.
+    /// Appends the tree over triangles [first, last) to `out`, without boxes: a node, then its branches; the same whatever
+    /// `jobs` is.
     uint32_t build(std::vector<Node>& out, uint32_t first, uint32_t last, int jobs) {
         const uint32_t middle = split(first, last);
         const uint32_t cuts[5] = {first, split(first, middle), middle, split(middle, last), last};
@@ -98,15 +135,13 @@ struct SurfaceIndex::Impl {
         if (shared) parallel_for(4, jobs, [&](size_t k) { build(branches[k], cuts[k], cuts[k + 1], 1); });
         const uint32_t self = uint32_t(out.size());
         out.emplace_back();
-        for (int k = 0; k < 4; ++k) {
+        for (uint32_t k = 0; k < lanes; ++k) {
             const uint32_t count = cuts[k + 1] - cuts[k];
-            const Box box = bounds(cuts[k], cuts[k + 1]);
-            const uint32_t child = count == 0           ? no_child
-                                   : count <= leaf_size ? leaf_bit | cuts[k] << 3 | count
-                                   : shared             ? append(out, branches[k])
-                                                        : build(out, cuts[k], cuts[k + 1], 1);
+            const uint32_t child = count == 0       ? no_child
+                                   : count <= lanes ? leaf_bit | cuts[k] / lanes
+                                   : shared         ? append(out, branches[k])
+                                                    : build(out, cuts[k], cuts[k + 1], 1);
             out[self].child[k] = child;
-            for (int a = 0; a < 3; ++a) out[self].lower[a][k] = box.lower[a], out[self].upper[a][k] = box.upper[a];
         }
         return self;
     }
@@ -119,11 +154,48 @@ struct SurfaceIndex::Impl {
         }
         return base;
     }
+    /// Squared distance of the closest triangle that is `at_most` so far, or of any that is nearer than `enough`; else infinity.
+    float search(const glm::vec3& x, float at_most, float enough, uint32_t& triangle) const;
+    void name_triangles() {
+        leaves.resize((triangles.size() + lanes - 1) / lanes);
+        for (size_t i = 0; i < leaves.size() * lanes; ++i)
+            leaves[i / lanes].triangle[i % lanes] = triangles[std::min(i, triangles.size() - 1)];
+        triangles = {}, centres = {};
+    }
+    Corners corners(uint32_t triangle) const {
+        const Triangle& t = mesh->triangles[triangle];
+        return {mesh->positions[t[0]], mesh->positions[t[1]], mesh->positions[t[2]]};
+    }
+    Box place(Leaf& leaf) const {
+        Box box;
+        for (uint32_t k = 0; k < lanes; ++k) {
+            const Corners t = corners(leaf.triangle[k]);
+            box.add(t.a), box.add(t.b), box.add(t.c);
+            for (int d = 0; d < 3; ++d)
+                leaf.a[d][k] = t.a[d], leaf.b[d][k] = t.b[d] - t.a[d], leaf.c[d][k] = t.c[d] - t.a[d];
+        }
+        return box;
+    }
+    /// Where the mesh stands: leaves, then boxes from the last node to the first, as children come after their parents.
+    void place_all(int jobs) {
+        constexpr size_t run = 1024;
+        std::vector<Box> of_leaf(leaves.size()), of_node(nodes.size());
+        parallel_for((leaves.size() + run - 1) / run, jobs, [&](size_t r) {
+            for (size_t i = r * run; i < std::min(leaves.size(), (r + 1) * run); ++i) of_leaf[i] = place(leaves[i]);
+        });
+        for (size_t i = nodes.size(); i-- > 0;)
+            for (uint32_t k = 0; k < lanes; ++k) {
+                const uint32_t child = nodes[i].child[k];
+                const Box box = child == no_child ? Box{} : child & leaf_bit ? of_leaf[child & ~leaf_bit] : of_node[child];
+                of_node[i].add(box);
+                for (int d = 0; d < 3; ++d) nodes[i].lower[d][k] = box.lower[d], nodes[i].upper[d][k] = box.upper[d];
+            }
+    }
 };
 
 SurfaceIndex::SurfaceIndex(const Mesh& mesh, int jobs) : impl_(new Impl{&mesh, {}, {}, {}, {}}) {
     const uint32_t count = uint32_t(mesh.triangles.size());
-    if (count >= leaf_bit >> 3)
+    if (count >= leaf_bit)
         throw InputError("a frame of " + std::to_string(count) + " triangles is more than this version can index");
     if (count == 0) return;
     impl_->triangles.resize(count);
@@ -135,21 +207,18 @@ SurfaceIndex::SurfaceIndex(const Mesh& mesh, int jobs) : impl_(new Impl{&mesh, {
     }
     impl_->nodes.reserve(count / 4 + 4);
     impl_->build(impl_->nodes, 0, count, jobs);
-    impl_->centres = {};
-    impl_->corners.reserve(count);
-    for (uint32_t i : impl_->triangles) {
-        const Triangle& t = mesh.triangles[i];
-        impl_->corners.push_back({mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]});
-    }
+    impl_->name_triangles();
+    impl_->place_all(jobs);
+}
+SurfaceIndex::SurfaceIndex(const Mesh& moved, const SurfaceIndex& before, int jobs) : impl_(new Impl(*before.impl_)) {
+    impl_->mesh = &moved;
+    impl_->place_all(jobs);
 }
 SurfaceIndex::~SurfaceIndex() = default;
 SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;
 const Mesh& SurfaceIndex::mesh() const { return *impl_->mesh; }
 
-SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most) const {
-    Hit hit;
-    hit.distance = std::numeric_limits<float>::infinity();
-    if (impl_->nodes.empty()) return hit;
+float SurfaceIndex::Impl::search(const glm::vec3& x, float at_most, float enough, uint32_t& triangle) const {
     struct Entry {
         float distance2;
         uint32_t child;
@@ -158,45 +227,45 @@ SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most) const
     stack[depth++] = {0, 0};
     float best = at_most * at_most;
     bool found = false;
-    while (depth > 0) {
+    while (depth > 0 && !(found && best < enough * enough)) {
         const Entry top = stack[--depth];
         if (top.distance2 > best) continue;
         if (top.child & leaf_bit) {
-            const uint32_t first = (top.child & ~leaf_bit) >> 3, count = top.child & 7;
-            for (uint32_t i = first; i < first + count; ++i) {
-                const Corners& c = impl_->corners[i];
-                const Corners local{c.a - x, c.b - x, c.c - x};
-                const glm::vec3 weights = closest_barycentric(local);
-                const glm::vec3 offset = local.a * weights.x + local.b * weights.y + local.c * weights.z;
-                const float distance2 = glm::dot(offset, offset);
-                if (found ? distance2 < best : distance2 <= best) {
-                    best = distance2;
-                    found = true;
-                    hit.point = x + offset, hit.triangle = impl_->triangles[i], hit.barycentric = weights;
-                }
-            }
+            const Leaf& leaf = leaves[top.child & ~leaf_bit];
+            const Lanes distance2 = squared_distances(leaf, x);
+            for (uint32_t k = 0; k < lanes; ++k)
+                if (found ? distance2[k] < best : distance2[k] <= best)
+                    best = distance2[k], found = true, triangle = leaf.triangle[k];
             continue;
         }
-        const Node& node = impl_->nodes[top.child];
-        float distance2[4];
-        for (int k = 0; k < 4; ++k) {
-            float sum = 0;
-            for (int a = 0; a < 3; ++a) {
-                const float out = std::max(std::max(node.lower[a][k] - x[a], x[a] - node.upper[a][k]), 0.0f);
-                sum += out * out;
-            }
-            distance2[k] = sum;
-        }
+        const Node& node = nodes[top.child];
+        const Lanes distance2 = squared_distances(node, x);
         const uint32_t base = depth;  // pushed far to near: the nearest child is looked at first
-        for (int k = 0; k < 4; ++k) {
+        for (uint32_t k = 0; k < lanes; ++k) {
             if (!(distance2[k] <= best) || node.child[k] == no_child) continue;
             uint32_t at = depth++;
             for (; at > base && stack[at - 1].distance2 < distance2[k]; --at) stack[at] = stack[at - 1];
             stack[at] = {distance2[k], node.child[k]};
         }
     }
-    if (found) hit.distance = std::sqrt(best);
+    return found ? best : std::numeric_limits<float>::infinity();
+}
+
+SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most) const {
+    Hit hit;
+    hit.distance = std::numeric_limits<float>::infinity();
+    if (impl_->nodes.empty() || impl_->search(x, at_most, 0, hit.triangle) == hit.distance) return hit;
+    const Corners t = impl_->corners(hit.triangle);
+    const Corners local{t.a - x, t.b - x, t.c - x};
+    hit.barycentric = closest_barycentric(local);
+    const glm::vec3 offset = local.a * hit.barycentric.x + local.b * hit.barycentric.y + local.c * hit.barycentric.z;
+    hit.point = x + offset, hit.distance = glm::length(offset);
     return hit;
+}
+
+bool SurfaceIndex::within(const glm::vec3& x, float distance) const {
+    uint32_t any;
+    return !impl_->nodes.empty() && impl_->search(x, distance, distance, any) < distance * distance;
 }
 
 }  // namespace rill::cooker

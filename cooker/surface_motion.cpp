@@ -12,17 +12,37 @@ namespace {
 
 constexpr float inertia = 0.7f;  // at 0 4 % more bytes at equal p99, at .85 and 1 as many
 
-/// Neighbours of every vertex over its edges, one list after another.
+/// What lies around every vertex, one list after another.
 struct Neighbours {
-    std::vector<uint32_t> first, vertex;
-    explicit Neighbours(const Mesh& mesh) : first(mesh.positions.size() + 1) {
+    std::vector<uint32_t> first_corner, first;
+    std::vector<glm::uvec2> corner;  ///< of its triangles: the next two vertices
+    std::vector<uint32_t> vertex;    ///< over its edges, each once
+    explicit Neighbours(const Mesh& mesh) : first_corner(mesh.positions.size() + 1), first(1) {
         for (const Triangle& t : mesh.triangles)
-            for (uint32_t v : t) first[v + 1] += 2;
-        for (size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-        vertex.resize(first.back());
-        std::vector<uint32_t> next(first.begin(), first.end() - 1);
+            for (uint32_t v : t) ++first_corner[v + 1];
+        for (size_t i = 1; i < first_corner.size(); ++i) first_corner[i] += first_corner[i - 1];
+        corner.resize(first_corner.back());
+        std::vector<uint32_t> next(first_corner.begin(), first_corner.end() - 1);
         for (const Triangle& t : mesh.triangles)
-            for (int k = 0; k < 3; ++k) vertex[next[t[k]]++] = t[(k + 1) % 3], vertex[next[t[k]]++] = t[(k + 2) % 3];
+            for (size_t k = 0; k < 3; ++k) corner[next[t[k]]++] = {t[(k + 1) % 3], t[(k + 2) % 3]};
+        vertex.reserve(corner.size());
+        for (size_t i = 0; i < mesh.positions.size(); ++i) {
+            for (uint32_t k = first_corner[i]; k < first_corner[i + 1]; ++k) add(corner[k].x);
+            for (uint32_t k = first_corner[i]; k < first_corner[i + 1]; ++k) add(corner[k].y);
+            first.push_back(uint32_t(vertex.size()));
+        }
+    }
+    /// Of vertex i, by area.
+    glm::vec3 normal(const std::vector<glm::vec3>& positions, size_t i) const {
+        glm::vec3 sum(0);
+        for (uint32_t k = first_corner[i]; k < first_corner[i + 1]; ++k)
+            sum += glm::cross(positions[corner[k].x] - positions[i], positions[corner[k].y] - positions[i]);
+        return unit_normal(sum);
+    }
+
+private:
+    void add(uint32_t v) {
+        if (std::find(vertex.begin() + first.back(), vertex.end(), v) == vertex.end()) vertex.push_back(v);
     }
 };
 
@@ -42,45 +62,43 @@ void for_each(size_t count, int jobs, const Work& work) {
     });
 }
 
-/// The surface that is gone to.
-struct Target {
-    const Mesh& mesh;
-    SurfaceIndex index;
-    std::vector<glm::vec3> normals;
-    Target(const Mesh& to, int jobs) : mesh(to), index(to, jobs), normals(vertex_normals(to)) {}
-};
-
 glm::vec3 at(const SurfaceIndex::Hit& hit, const Triangle& t, const std::vector<glm::vec3>& values) {
     return hit.barycentric.x * values[t[0]] + hit.barycentric.y * values[t[1]] + hit.barycentric.z * values[t[2]];
 }
 
-/// Of every `stride`-th vertex of either surface.
-std::vector<Pull> find_pulls(const Mesh& from, const Target& to, const std::vector<glm::vec3>& motion, float reach, size_t stride, int jobs) {
-    constexpr float alike = 0.3f;  // cosine: across a sheet the other side faces away
+Mesh moved_by(const Mesh& mesh, const std::vector<glm::vec3>& motion) {
     Mesh moved;
-    moved.triangles = from.triangles, moved.positions = from.positions;
+    moved.triangles = mesh.triangles, moved.positions = mesh.positions;
     for (size_t i = 0; i < motion.size(); ++i) moved.positions[i] += motion[i];
-    const std::vector<glm::vec3> normals = vertex_normals(moved);
-    std::vector<Pull> pulls(motion.size());
-    for_each(motion.size(), jobs, [&](size_t i) {
+    return moved;
+}
+
+/// Of every `stride`-th vertex of either surface: `moved`, and the one that is gone to.
+std::vector<Pull> find_pulls(const SurfaceIndex& moved, const Neighbours& neighbours, const SurfaceIndex& to,
+                             const std::vector<glm::vec3>& to_normals, float reach, size_t stride, int jobs) {
+    constexpr float alike = 0.3f;  // cosine: across a sheet the other side faces away
+    const std::vector<glm::vec3>&here = moved.mesh().positions, &there = to.mesh().positions;
+    std::vector<glm::vec3> normals(here.size());
+    std::vector<Pull> pulls(here.size());
+    for_each(here.size(), jobs, [&](size_t i) {
+        normals[i] = neighbours.normal(here, i);
         if (i % stride) return;
-        const SurfaceIndex::Hit hit = to.index.closest(moved.positions[i], reach);
+        const SurfaceIndex::Hit hit = to.closest(here[i], reach);
         if (!(hit.distance < reach)) return;
-        const glm::vec3 n = at(hit, to.mesh.triangles[hit.triangle], to.normals);
-        if (glm::dot(n, normals[i]) > alike) pulls[i].add(hit.point - moved.positions[i], n, 1);
+        const glm::vec3 n = at(hit, to.mesh().triangles[hit.triangle], to_normals);
+        if (glm::dot(n, normals[i]) > alike) pulls[i].add(hit.point - here[i], n, 1);
     });
     // What the next surface has and nothing of this one goes to: crowns and fingers as they shoot out.
-    const SurfaceIndex moved_index(moved, jobs);
-    std::vector<SurfaceIndex::Hit> hits((to.mesh.positions.size() + stride - 1) / stride);
-    for_each(hits.size(), jobs, [&](size_t k) { hits[k] = moved_index.closest(to.mesh.positions[k * stride], reach); });
+    std::vector<SurfaceIndex::Hit> hits((there.size() + stride - 1) / stride);
+    for_each(hits.size(), jobs, [&](size_t k) { hits[k] = moved.closest(there[k * stride], reach); });
     for (size_t k = 0; k < hits.size(); ++k) {
         const SurfaceIndex::Hit& hit = hits[k];
         const size_t i = k * stride;
         if (!(hit.distance < reach)) continue;
-        const Triangle& t = moved.triangles[hit.triangle];
-        if (glm::dot(at(hit, t, normals), to.normals[i]) <= alike) continue;
+        const Triangle& t = moved.mesh().triangles[hit.triangle];
+        if (glm::dot(at(hit, t, normals), to_normals[i]) <= alike) continue;
         for (int c = 0; c < 3; ++c)
-            if (hit.barycentric[c] > 0) pulls[t[size_t(c)]].add(to.mesh.positions[i] - hit.point, to.normals[i], hit.barycentric[c]);
+            if (hit.barycentric[c] > 0) pulls[t[size_t(c)]].add(there[i] - hit.point, to_normals[i], hit.barycentric[c]);
     }
     return pulls;
 }
@@ -119,13 +137,13 @@ void add_neighbours(std::vector<float>& values, const Neighbours& neighbours) {
 
 }  // namespace
 
-std::vector<glm::vec3> surface_motion(const Mesh& from, const Mesh& to, int jobs, std::vector<glm::vec3> start) {
+std::vector<glm::vec3> surface_motion(const SurfaceIndex& from, const SurfaceIndex& to, int jobs, std::vector<glm::vec3> start) {
     std::vector<glm::vec3> motion = std::move(start);
-    motion.resize(from.positions.size(), glm::vec3(0));
-    if (from.triangles.empty() || to.triangles.empty()) return motion;
-    const Neighbours neighbours(from);
-    const Target target(to, jobs);
-    const float edge = median_edge(from);
+    motion.resize(from.mesh().positions.size(), glm::vec3(0));
+    if (from.mesh().triangles.empty() || to.mesh().triangles.empty()) return motion;
+    const Neighbours neighbours(from.mesh());
+    const std::vector<glm::vec3> to_normals = vertex_normals(to.mesh());
+    const float edge = median_edge(from.mesh());
     struct Step {
         float stiffness;
         int sweeps;
@@ -133,19 +151,21 @@ std::vector<glm::vec3> surface_motion(const Mesh& from, const Mesh& to, int jobs
         size_t stride;  // of the vertices that pull: while it is stiff, some speak for all
     };
     constexpr Step steps[] = {{12, 60, 12, 4}, {4, 40, 10, 3}, {1.5f, 25, 8, 2}, {0.6f, 12, 5, 1}, {0.2f, 8, 3, 1}};
-    for (const Step& step : steps)
-        relax(motion, find_pulls(from, target, motion, step.reach * edge, step.stride, jobs), neighbours, step.stiffness, step.sweeps, jobs);
+    for (const Step& step : steps) {
+        const Mesh moved = moved_by(from.mesh(), motion);
+        const std::vector<Pull> pulls =
+            find_pulls(SurfaceIndex(moved, from, jobs), neighbours, to, to_normals, step.reach * edge, step.stride, jobs);
+        relax(motion, pulls, neighbours, step.stiffness, step.sweeps, jobs);
+    }
     return motion;
 }
 
-std::vector<glm::vec3> motion_goes_on(const Mesh& before, const std::vector<glm::vec3>& motion, const Mesh& now, float longer, int jobs) {
+std::vector<glm::vec3> motion_goes_on(const SurfaceIndex& before, const std::vector<glm::vec3>& motion, const Mesh& now, float longer, int jobs) {
     constexpr float reach = 2;  // edges
     std::vector<glm::vec3> next(now.positions.size(), glm::vec3(0));
-    if (before.triangles.empty()) return next;
-    Mesh moved;
-    moved.triangles = before.triangles, moved.positions = before.positions;
-    for (size_t i = 0; i < motion.size(); ++i) moved.positions[i] += motion[i];
-    const SurfaceIndex index(moved, jobs);
+    if (before.mesh().triangles.empty()) return next;
+    const Mesh moved = moved_by(before.mesh(), motion);
+    const SurfaceIndex index(moved, before, jobs);
     const float near = reach * median_edge(now);
     for_each(next.size(), jobs, [&](size_t i) {
         const SurfaceIndex::Hit hit = index.closest(now.positions[i], near);

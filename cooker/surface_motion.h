@@ -14,9 +14,10 @@ namespace rill::cooker {
 /// Motion of every vertex of `from`, metres, onto the surface of `to`: closest points that face alike, asked for
 /// from both sides, under a smoothness that loosens step by step; zero where there is nothing to go to. It begins at
 /// `start`, or at rest if that is empty. The same for any `jobs`.
-std::vector<glm::vec3> surface_motion(const Mesh& from, const Mesh& to, int jobs, std::vector<glm::vec3> start = {});
+std::vector<glm::vec3> surface_motion(const SurfaceIndex& from, const SurfaceIndex& to, int jobs, std::vector<glm::vec3> start = {});
 /// A start for `now`: most of the `motion` that brought `before` here, times `longer`: the next step's time over the last one's.
-std::vector<glm::vec3> motion_goes_on(const Mesh& before, const std::vector<glm::vec3>& motion, const Mesh& now, float longer, int jobs);
+std::vector<glm::vec3> motion_goes_on(const SurfaceIndex& before, const std::vector<glm::vec3>& motion, const Mesh& now, float longer,
+                                      int jobs);
 
 /// Motion of every vertex of `from` with the liquid, metres: by the mean of the velocities where it starts and where it lands
 /// on `to`. At rest without velocities. `to_index`: of `to`.

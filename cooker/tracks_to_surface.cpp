@@ -95,7 +95,7 @@ void mark_spurs(const SurfaceFrame& frame, const std::vector<SurfacePoint>& poin
     parallel_for((nearest.size() + batch - 1) / batch, jobs, [&](size_t part) {
         for (size_t i = part * batch; i < std::min(nearest.size(), (part + 1) * batch); ++i) {
             const glm::vec3& x = decoded.positions[i];
-            if (frame.index.closest(x, beyond).distance < beyond) continue;
+            if (frame.index.within(x, beyond)) continue;
             const SurfaceIndex::Hit source = frame.index.closest(x, INFINITY);
             const glm::vec3& b = source.barycentric;
             nearest[i] = frame.mesh.triangles[source.triangle][b.x >= b.y && b.x >= b.z ? 0 : b.y >= b.z ? 1 : 2];

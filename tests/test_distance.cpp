@@ -39,7 +39,7 @@ TEST_CASE("closest point equals brute force, also on slivers and degenerate tria
     std::mt19937 random(7);
     auto number = [&] { return float(random() % 2001) / 1000.0f - 1.0f; };
     Mesh mesh;
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < 303; ++i) {  // not by fours: the last leaf is not full
         const glm::vec3 a(number(), number(), number());
         const float size = i % 3 == 0 ? 0.5f : 0.05f;
         mesh.positions.push_back(a);
@@ -64,6 +64,8 @@ TEST_CASE("closest point equals brute force, also on slivers and degenerate tria
         REQUIRE(glm::distance(x, hit.point) == doctest::Approx(hit.distance).epsilon(1e-4));
         CHECK(index.closest(x, hit.distance * 0.99f).distance == infinity);
         CHECK(index.closest(x, hit.distance * 1.01f).distance == hit.distance);
+        CHECK(!index.within(x, hit.distance * 0.99f));
+        CHECK(index.within(x, hit.distance * 1.01f));
     }
 }
 
@@ -81,6 +83,24 @@ TEST_CASE("an index built by many threads answers as one built by one") {
             REQUIRE(a.barycentric == b.barycentric);
         }
     }
+}
+
+TEST_CASE("an index of a mesh that has moved answers as one built for it") {
+    const Mesh before = bumpy_sphere(60, 1);
+    Mesh moved = before;
+    for (glm::vec3& x : moved.positions) x = glm::vec3(0.4f * x.x + 3, x.y + 0.3f * std::sin(4 * x.z), 2 * x.z);
+    const SurfaceIndex old(before), anew(moved);
+    for (const int jobs : {1, 3}) {
+        const SurfaceIndex index(moved, old, jobs);
+        CHECK(&index.mesh() == &moved);
+        for (size_t i = 0; i < moved.positions.size(); i += 5) {
+            const glm::vec3 x = 1.2f * moved.positions[i] - before.positions[i];
+            REQUIRE(index.closest(x, infinity).distance == doctest::Approx(anew.closest(x, infinity).distance).epsilon(1e-5));
+        }
+    }
+    CHECK(old.closest(before.positions[7], infinity).distance == 0);
+    const Mesh none;
+    CHECK(SurfaceIndex(none, SurfaceIndex(none), 1).closest({0, 0, 0}, infinity).distance == infinity);
 }
 
 TEST_CASE("many triangles in one place do not unbalance the tree") {
@@ -148,6 +168,7 @@ TEST_CASE("empty meshes") {
     CHECK(between(none, some).p99 == infinity);
     CHECK(between(some, none).mean == infinity);
     CHECK(SurfaceIndex(none).closest({0, 0, 0}, infinity).distance == infinity);
+    CHECK(!SurfaceIndex(none).within({0, 0, 0}, infinity));
     CHECK(between(some, none).histogram.quantile(0.99) == infinity);
 }
 

@@ -171,24 +171,27 @@ TEST_CASE("estimated velocity lands on the next surface") {
     const Mesh last = real->read(59), before = real->read(58);  // looks back
     CHECK(miss(last, before, -step) < 0.2 * miss(last, before, 0));
 
+    const auto onto = [](const Mesh& from, const Mesh& to, int jobs, std::vector<glm::vec3> start = {}) {
+        return surface_motion(SurfaceIndex(from), SurfaceIndex(to), jobs, std::move(start));
+    };
     // A ball that falls two edges: not the surface alone, every vertex goes along, tangentially too.
     const Mesh a = bumpy_sphere(16, 0.5f), b = bumpy_sphere(16, 0.5f, {0, 0, -0.15f});
-    const std::vector<glm::vec3> motion = surface_motion(a, b, 0);
+    const std::vector<glm::vec3> motion = onto(a, b, 0);
     glm::vec3 mean(0);
     for (const glm::vec3& m : motion) mean += m / float(motion.size());
     CHECK(glm::distance(mean, {0, 0, -0.15f}) < 0.03f);
-    CHECK(surface_motion(a, Mesh{}, 0) == std::vector<glm::vec3>(a.positions.size(), glm::vec3(0)));
-    CHECK(surface_motion(Mesh{}, a, 0).empty());
+    CHECK(onto(a, Mesh{}, 0) == std::vector<glm::vec3>(a.positions.size(), glm::vec3(0)));
+    CHECK(onto(Mesh{}, a, 0).empty());
     const Mesh many = bumpy_sphere(128, 0.5f), moved = bumpy_sphere(128, 0.5f, {0, 0, -0.05f});
     REQUIRE(many.positions.size() > 3 * 2048);  // of work for three
-    CHECK(surface_motion(many, moved, 1) == surface_motion(many, moved, 3));
+    CHECK(onto(many, moved, 1) == onto(many, moved, 3));
 
     // It goes on, for the most part, from where it came to, and by as much as there is time.
     const Mesh c = bumpy_sphere(16, 0.5f, {0, 0, -0.3f});
     const std::vector<glm::vec3> all(a.positions.size(), {0, 0, -0.15f});
-    for (const glm::vec3& m : motion_goes_on(a, all, b, 1, 0)) CHECK(glm::distance(m, {0, 0, 0.7f * -0.15f}) < 1e-5f);
-    for (const glm::vec3& m : motion_goes_on(a, all, b, 2, 0)) CHECK(glm::distance(m, {0, 0, 1.4f * -0.15f}) < 1e-5f);
-    CHECK(mean_miss(b, surface_motion(b, c, 0, all), SurfaceIndex(c), 1, 0) < 0.005);
+    for (const glm::vec3& m : motion_goes_on(SurfaceIndex(a), all, b, 1, 0)) CHECK(glm::distance(m, {0, 0, 0.7f * -0.15f}) < 1e-5f);
+    for (const glm::vec3& m : motion_goes_on(SurfaceIndex(a), all, b, 2, 0)) CHECK(glm::distance(m, {0, 0, 1.4f * -0.15f}) < 1e-5f);
+    CHECK(mean_miss(b, onto(b, c, 0, all), SurfaceIndex(c), 1, 0) < 0.005);
 }
 
 TEST_CASE("the motion of the liquid: where it is sound, how it stretches the surface") {
