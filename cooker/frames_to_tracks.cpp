@@ -11,7 +11,8 @@ namespace rill::cooker {
 namespace {
 
 constexpr int coding_rounds = 2;
-constexpr int last_mendings = 2;  // README.md, "Spurs"
+constexpr int last_mendings = 3;  // README.md, "Spurs"; the last with repairs
+constexpr float repair_beyond = 2.5f;  // tolerances
 constexpr int most_rounds = 8;    // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
@@ -178,8 +179,9 @@ Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, in
     return sweep;
 }
 
-/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears. By rule; then, if
+/// `by_trial`, at what is still torn.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, bool by_trial = false) {
     const size_t first = window.paths.size();
     // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
     for (int s = 0; s < window.samples(); ++s) {
@@ -192,6 +194,10 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
         Residual residual = measure_residual(frame, points, goal.jobs);
         mark_spurs(frame, points, mending.spur * goal.tolerance, residual, goal.jobs);
         bear_tracks(window, s, residual, points, goal, mending);
+        if (!by_trial) continue;
+        const std::vector<SurfacePoint> mended = mended_at(window, coded, first, s).points;
+        for (Path& path : repair_surface(frame, s, mended, repair_beyond * goal.tolerance, goal.jobs))
+            window.paths.push_back(std::move(path));
     }
 }
 
@@ -324,7 +330,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
     for (int round = 0; round < last_mendings; ++round) {
         const size_t mended = window.paths.size();
-        mend(window, coded, goal);
+        mend(window, coded, goal, round + 1 == last_mendings);
         code(mended);
     }
     for (const TrackSamples& drop : track_drops(window)) {

@@ -6,6 +6,7 @@
 //   surface_motion         how each surface moves onto the next
 //   samples_to_tracks      points are carried through the window's frames by that motion, held to the surface
 //   tracks_to_surface      what the tracks decode to, measured at every source vertex; corrections
+//   points_to_repairs      what coding has torn is mended, by trial
 //   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
 //   coefficients_to_layers progressive order, blocks
 //   layers_to_chunks       entropy coding
@@ -85,6 +86,9 @@ double residual_percentile(const SurfaceFrame& frame, const Residual& residual, 
 /// `spur_room` of that.
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
                                         float threshold, float tolerance, float spur_room = 1);
+/// Paths born at a sample where the decoded mesh of the points and the source are more than `beyond` metres apart, in either
+/// direction: those that, by trial, leave the decoded surface better there.
+std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs);
 
 /// Carries the point to the next frame by the motion of the vertices of this one; empty where the surface leaves it.
 std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vector<glm::vec3>& motion, const SurfaceFrame& to,

@@ -94,3 +94,33 @@ TEST_CASE("at a spur a point is born where others would stand too close") {
     CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge).empty());
     CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge, 0.5f).size() == 1);
 }
+
+TEST_CASE("what is torn is repaired by points that leave less off the source, the same with any number of threads") {
+    const SurfaceFrame frame = frame_of_ball();
+    const std::vector<SurfacePoint> whole = points_of(24, radius);
+    const float beyond = 0.7f * frame.edge;
+    CHECK(repair_surface(frame, 0, whole, beyond, 2).empty());
+
+    std::vector<SurfacePoint> torn;  // a lid is gone: the ball is cut flat there
+    for (const SurfacePoint& p : whole)
+        if (p.normal.x < 0.4f) torn.push_back(p);
+    const auto farthest = [&](const std::vector<SurfacePoint>& points) {
+        const Mesh decoded = mesh_points(points, frame.edge);
+        return surface_distance(frame.mesh, frame.index, decoded, SurfaceIndex(decoded)).max;
+    };
+    REQUIRE(farthest(torn) > beyond);
+    const std::vector<Path> born = repair_surface(frame, 5, torn, beyond, 1);
+    REQUIRE(!born.empty());
+    std::vector<SurfacePoint> mended = torn;
+    for (const Path& path : born) {
+        CHECK(path.birth == 5);
+        CHECK(path.death == 5);
+        CHECK(glm::length(path.target(5).position) == doctest::Approx(radius).epsilon(0.01));
+        mended.push_back(path.target(5));
+    }
+    CHECK(farthest(mended) < 0.7 * farthest(torn));
+    const std::vector<Path> again = repair_surface(frame, 5, torn, beyond, 3);
+    REQUIRE(again.size() == born.size());
+    for (size_t i = 0; i < born.size(); ++i) CHECK(again[i].target(5).position == born[i].target(5).position);
+    CHECK(repair_surface(frame, 0, {}, beyond, 1).empty());
+}

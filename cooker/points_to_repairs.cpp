@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+// Births where coding has torn the surface. A point more changes the patches of all its neighbours, so that births by a rule
+// tear a rim elsewhere as they mend it. Here the decoder is asked: of the points that could be born at a torn place, the one is
+// taken that leaves least liquid and air confused; then the next. What else was tried: README.md, "Spurs".
+#include <algorithm>
+#include <cmath>
+
+#include "parallel.h"
+#include "pipeline.h"
+#include "points_to_mesh.h"
+
+namespace rill::cooker {
+namespace {
+
+// Lengths in edges.
+constexpr float place_radius = 2.5f;      // around the vertex that is farthest off
+constexpr float probe_spacing = 0.5f;
+constexpr float least_depth = 0.2f, most_depth = 2;  // of a probe: nearer to the surface its side is in doubt
+constexpr float candidates_apart = 0.8f;  // unless they face apart
+constexpr size_t most_candidates = 12;
+constexpr int most_repairs = 3;           // of a place
+constexpr float point_radius = 1.6f;      // of the fit that places a point
+constexpr double least_share = 0.25, least_gain = 1;  // of what is confused, and edges: what a point must mend
+constexpr float same_side = 0.3f;
+constexpr size_t points_per_place = 8;    // of a frame, at the least: where all is torn, points for all would not mend it
+constexpr float near_by = 24;             // from a place on points count for less and less
+
+struct OffSurface {
+    glm::vec3 position;
+    float distance;
+};
+/// Vertices of either surface that are farther than `beyond` from the other, worst first.
+std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded, float beyond, int jobs) {
+    const SurfaceIndex decoded_index(decoded, jobs);
+    const size_t own = frame.mesh.positions.size(), all = own + decoded.positions.size();
+    std::vector<OffSurface> off(all);
+    constexpr size_t batch = 1024;
+    parallel_for((all + batch - 1) / batch, jobs, [&](size_t part) {
+        for (size_t i = part * batch; i < std::min(all, (part + 1) * batch); ++i) {
+            const glm::vec3& x = i < own ? frame.mesh.positions[i] : decoded.positions[i - own];
+            const SurfaceIndex& other = i < own ? decoded_index : frame.index;
+            off[i] = {x, other.within(x, beyond) ? 0 : std::min(other.closest(x, 4 * beyond).distance, 4 * beyond)};
+        }
+    });
+    std::erase_if(off, [](const OffSurface& o) { return o.distance == 0; });
+    std::stable_sort(off.begin(), off.end(), [](const OffSurface& a, const OffSurface& b) { return a.distance > b.distance; });
+    return off;
+}
+
+/// How deep x lies in the source's liquid, metres; negative: in the air. 0 farther than `most` from its surface.
+float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most) {
+    const SurfaceIndex::Hit hit = frame.index.closest(x, most);
+    if (!(hit.distance < most)) return 0;
+    const Triangle& t = frame.mesh.triangles[hit.triangle];
+    const auto& n = frame.mesh.normals;
+    const glm::vec3 normal = hit.barycentric.x * n[t[0]] + hit.barycentric.y * n[t[1]] + hit.barycentric.z * n[t[2]];
+    return glm::dot(normal, x - hit.point) > 0 ? -hit.distance : hit.distance;
+}
+
+/// A torn place: probes in it whose side is known, and points that could be born there.
+struct Place {
+    glm::vec3 centre;
+    std::vector<float> x, y, z, depth;
+    std::vector<SurfacePoint> candidates;
+};
+
+void place_probes(const SurfaceFrame& frame, Place& place) {
+    const int reach = int(place_radius / probe_spacing);
+    for (int k = -reach; k <= reach; ++k)
+        for (int j = -reach; j <= reach; ++j)
+            for (int i = -reach; i <= reach; ++i) {
+                if (i * i + j * j + k * k > reach * reach) continue;
+                const glm::vec3 x = place.centre + probe_spacing * frame.edge * glm::vec3(i, j, k);
+                const float depth = depth_at(frame, x, most_depth * frame.edge);
+                if (std::fabs(depth) < least_depth * frame.edge) continue;
+                place.x.push_back(x.x), place.y.push_back(x.y), place.z.push_back(x.z), place.depth.push_back(depth);
+            }
+}
+
+void find_candidates(const SurfaceFrame& frame, Place& place) {
+    std::vector<VertexTree::Found> found;
+    frame.tree.within(place.centre, place_radius * frame.edge, found);
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.distance2 < b.distance2; });
+    for (const auto& f : found) {
+        SurfacePoint p{frame.mesh.positions[f.vertex], frame.mesh.normals[f.vertex], {}};
+        const bool taken = std::any_of(place.candidates.begin(), place.candidates.end(), [&](const SurfacePoint& q) {
+            return glm::distance(p.position, q.position) < candidates_apart * frame.edge && glm::dot(p.normal, q.normal) > same_side;
+        });
+        if (taken || !settle(frame, point_radius * frame.edge, p)) continue;
+        place.candidates.push_back(p);
+        if (place.candidates.size() == most_candidates) return;
+    }
+}
+
+/// All points near x, and ever fewer of those farther away: enough for the winding number, in a time that does not grow with
+/// the frame.
+std::vector<SurfacePoint> points_around(const std::vector<SurfacePoint>& points, const glm::vec3& x, float near) {
+    std::vector<SurfacePoint> around;
+    for (size_t i = 0; i < points.size(); ++i) {
+        const float away = glm::distance(points[i].position, x) / near;
+        const uint32_t stride = away < 1 ? 1 : 1u << std::min(20, 2 * (std::ilogb(away) + 1));
+        if (uint32_t(i * 2654435761u) >> 12 & (stride - 1)) continue;
+        around.push_back(points[i]);
+    }
+    return around;
+}
+
+/// Sum over the probes that the points decode to the wrong side of how deep they lie in theirs, edges.
+double confusion(const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points) {
+    const PointField decoded(points);
+    std::vector<float> value(place.x.size());
+    std::vector<uint32_t> candidates(points.size());
+    const glm::vec3 reach(place_radius * frame.edge), lower = place.centre - reach, upper = place.centre + reach;
+    const surface::Box box{{lower.x, lower.y, lower.z}, {upper.x, upper.y, upper.z}};
+    const uint32_t found = surface::gather(decoded.field, box, candidates.data(), uint32_t(candidates.size()));
+    surface::evaluate(decoded.field, candidates.data(), found, place.x.data(), place.y.data(), place.z.data(), uint32_t(value.size()),
+                      value.data());
+    double sum = 0;
+    for (size_t i = 0; i < value.size(); ++i)
+        if ((value[i] < 0) != (place.depth[i] > 0)) sum += std::fabs(place.depth[i]) / frame.edge;
+    return sum;
+}
+
+/// Takes candidates that mend the place, best first, into `points`.
+void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
+    std::vector<SurfacePoint> around = points_around(points, place.centre, near_by * frame.edge);
+    double now = confusion(frame, place, around);
+    std::vector<double> then;
+    for (int round = 0; round < most_repairs && !place.candidates.empty(); ++round) {
+        then.resize(place.candidates.size());
+        parallel_for(then.size(), jobs, [&](size_t i) {
+            std::vector<SurfacePoint> with = around;
+            with.push_back(place.candidates[i]);
+            then[i] = confusion(frame, place, with);
+        });
+        const auto best = std::min_element(then.begin(), then.end());
+        if (now - *best < std::max(least_gain, least_share * now)) return;
+        now = *best;
+        const auto chosen = place.candidates.begin() + (best - then.begin());
+        around.push_back(*chosen), points.push_back(*chosen);
+        place.candidates.erase(chosen);
+    }
+}
+
+}  // namespace
+
+std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs) {
+    if (points.empty() || frame.mesh.triangles.empty()) return {};
+    std::vector<SurfacePoint> all = points;
+    std::vector<glm::vec3> seen;
+    for (const OffSurface& off : find_off(frame, mesh_points(points, frame.edge, jobs), beyond, jobs)) {
+        const auto near = [&](const glm::vec3& x) { return glm::distance(x, off.position) < 2 * frame.edge; };
+        if (std::any_of(seen.begin(), seen.end(), near)) continue;
+        if (seen.size() > points.size() / points_per_place) break;
+        seen.push_back(off.position);
+        Place place{off.position, {}, {}, {}, {}, {}};
+        place_probes(frame, place), find_candidates(frame, place);
+        repair(frame, place, all, jobs);
+    }
+    std::vector<Path> born(all.size() - points.size());
+    for (size_t i = 0; i < born.size(); ++i) {
+        born[i].radius = point_radius * frame.edge, born[i].birth = born[i].death = sample;
+        born[i].at = {all[points.size() + i]}, born[i].correction = {0.f}, born[i].tilt = {glm::vec2(0)};
+    }
+    return born;
+}
+
+}  // namespace rill::cooker
