@@ -98,7 +98,7 @@ Lanes squared_distances(const Leaf& leaf, const glm::vec3& x) {
     const Lanes edges = lesser(lesser(from(along(ab, bb), none), from(none, along(ac, cc))), from(across, one - across));
     const Lanes v = cc * ab - bc * ac, w = bb * ac - bc * ab, all = bb * cc - bc * bc, scale = one / greater(all, least);
     const Lanes inside = from(v * scale, w * scale);
-    return (v >= none) & (w >= none) & (v + w <= all) & (inside < edges) ? inside : edges;
+    return ((v >= none) & (w >= none) & (v + w <= all) & (inside < edges)) ? inside : edges;
 }
 
 }  // namespace
