@@ -73,7 +73,7 @@ float room_for(const VertexTree& tree, const std::vector<SurfacePoint>& points, 
 }  // namespace
 
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
-                                        float threshold, float tolerance, float spur_room) {
+                                        float threshold, float tolerance) {
     const auto badness = [&](uint32_t v) {
         return residual.wrong_side[v] || residual.spur[v] ? 4 * frame.edge : std::min(std::fabs(residual.distance[v]), 4 * frame.edge);
     };
@@ -94,8 +94,7 @@ std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residua
     for (uint32_t v : bad) {
         const glm::vec3 velocity = frame.mesh.velocities.empty() ? glm::vec3(0) : frame.mesh.velocities[v];
         const SurfacePoint p{frame.mesh.positions[v], frame.mesh.normals[v], velocity};
-        const float near = spur_room * least;
-        const float room = residual.spur[v] ? room_for(tree, points, p, near, near) : room_for(tree, points, p, least, most);
+        const float room = residual.spur[v] ? room_for(tree, points, p, least, least) : room_for(tree, points, p, least, most);
         if (room <= 0 || !disks.free(p, room)) continue;
         disks.add(p);
         born.push_back(p);

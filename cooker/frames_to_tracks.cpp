@@ -11,20 +11,13 @@ namespace rill::cooker {
 namespace {
 
 constexpr int coding_rounds = 2;
-constexpr int last_mendings = 3;  // README.md, "Spurs"; the last with repairs
-constexpr float repair_beyond = 2.5f;  // tolerances
+constexpr int last_mendings = 3;  // README.md, "Spurs"
+// Tolerances: what bears points while tracks grow (the field off the source's vertices, the decoded mesh off the source), and mends.
+constexpr float missed_by = 1, spur_beyond = 4, repair_beyond = 2.5f;
 constexpr int most_rounds = 8;    // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
-
-/// What bears points.
-struct Births {
-    float error, spur;  ///< of the decoded field at the source's vertices, of the decoded mesh off the source: tolerances
-    float spur_room;    ///< beside spurs, of the usual least
-};
-constexpr Births growing{1, 4, 1};
-constexpr Births mending{2, 3, 0.5f};  // what coding leaves; the room at spurs: README.md, "Spurs"
 
 /// What a frame may lose when a point is taken away that its neighbours nearly make up for.
 struct Loss {
@@ -126,10 +119,9 @@ float spacing_at(const std::vector<SurfacePoint>& points, const VertexTree& tree
 
 /// Bears tracks where the frame misses the source; returns how many.
 size_t bear_tracks(Window& window, int sample, const Residual& residual, const std::vector<SurfacePoint>& points,
-                   const WindowGoal& goal, const Births& rule) {
+                   const WindowGoal& goal) {
     const SurfaceFrame& frame = *window.frames[size_t(sample)];
-    const std::vector<SurfacePoint> births =
-        choose_births(frame, residual, points, rule.error * goal.tolerance, goal.tolerance, rule.spur_room);
+    const std::vector<SurfacePoint> births = choose_births(frame, residual, points, missed_by * goal.tolerance, goal.tolerance);
     std::vector<SurfacePoint> all = points;
     all.insert(all.end(), births.begin(), births.end());
     std::vector<glm::vec3> positions;
@@ -163,8 +155,8 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
         if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);
-        if (round == 0) mark_spurs(frame, sweep.points, growing.spur * goal.tolerance, residual, goal.jobs);
-        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal, growing);
+        if (round == 0) mark_spurs(frame, sweep.points, spur_beyond * goal.tolerance, residual, goal.jobs);
+        const size_t born = bear_tracks(window, sample, residual, sweep.points, goal);
         last = born * enough <= sweep.points.size() || round + 1 == most_rounds;
         if (born == 0) break;
     }
@@ -179,9 +171,8 @@ Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, in
     return sweep;
 }
 
-/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears. By rule; then, if
-/// `by_trial`, at what is still torn.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, bool by_trial = false) {
+/// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
     const size_t first = window.paths.size();
     // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
     for (int s = 0; s < window.samples(); ++s) {
@@ -190,13 +181,7 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, bool
             thin_out(window, s, goal, mended_at(window, coded, first, s), first);
         }
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
-        const SurfaceFrame& frame = *window.frames[size_t(s)];
-        Residual residual = measure_residual(frame, points, goal.jobs);
-        mark_spurs(frame, points, mending.spur * goal.tolerance, residual, goal.jobs);
-        bear_tracks(window, s, residual, points, goal, mending);
-        if (!by_trial) continue;
-        const std::vector<SurfacePoint> mended = mended_at(window, coded, first, s).points;
-        for (Path& path : repair_surface(frame, s, mended, repair_beyond * goal.tolerance, goal.jobs))
+        for (Path& path : repair_surface(*window.frames[size_t(s)], s, points, repair_beyond * goal.tolerance, goal.jobs))
             window.paths.push_back(std::move(path));
     }
 }
@@ -330,7 +315,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
     for (int round = 0; round < last_mendings; ++round) {
         const size_t mended = window.paths.size();
-        mend(window, coded, goal, round + 1 == last_mendings);
+        mend(window, coded, goal);
         code(mended);
     }
     for (const TrackSamples& drop : track_drops(window)) {

@@ -82,10 +82,9 @@ Surplus measure_places(const std::vector<SurfacePoint>& points, const std::vecto
 double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction);
 
 /// New points where |residual| exceeds `threshold`: worst first, no two closer than half the spacing of the points
-/// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to; beside spurs, than
-/// `spur_room` of that.
+/// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to.
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
-                                        float threshold, float tolerance, float spur_room = 1);
+                                        float threshold, float tolerance);
 /// Paths born at a sample where the decoded mesh of the points and the source are more than `beyond` metres apart, in either
 /// direction: those that, by trial, leave the decoded surface better there.
 std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs);

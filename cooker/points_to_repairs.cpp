@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Births where coding has torn the surface. A point more changes the patches of all its neighbours, so that births by a rule
-// tear a rim elsewhere as they mend it. Here the decoder is asked: of the points that could be born at a torn place, the one is
-// taken that leaves least liquid and air confused; then the next. What else was tried: README.md, "Spurs".
+// Births where coding has torn the surface or opened a void. A point more changes the patches of all its neighbours, so that
+// births by a rule tear a rim elsewhere as they mend it. Here the decoder is asked: of the points that could be born at such a
+// place, the one is taken that leaves least liquid and air confused; then the next. What else was tried: README.md, "Spurs".
 #include <algorithm>
 #include <cmath>
 
@@ -13,14 +13,18 @@ namespace rill::cooker {
 namespace {
 
 // Lengths in edges.
-constexpr float place_radius = 2.5f;      // around the vertex that is farthest off
-constexpr float probe_spacing = 0.5f;
-constexpr float least_depth = 0.2f, most_depth = 2;  // of a probe: nearer to the surface its side is in doubt
-constexpr float candidates_apart = 0.8f;  // unless they face apart
+constexpr float least_radius = 2.5f, around_void = 1.5f;  // of a place: around the vertex that is farthest off; more than it is off
+constexpr float least_depth = 0.2f;       // of a probe: nearer to the surface its side is in doubt
+constexpr float farthest = 6;             // how far off is told
+// Lengths in radii of a place.
+constexpr float probe_spacing = 0.2f;
+constexpr float most_depth = 0.8f;        // of a probe
+constexpr float candidates_apart = 0.32f;  // unless they face apart
+constexpr float cleared = 0.8f;           // places begin no nearer to an earlier one
 constexpr size_t most_candidates = 12;
-constexpr int most_repairs = 3;           // of a place
+constexpr int most_repairs = 4;           // of a place
 constexpr float point_radius = 1.6f;      // of the fit that places a point
-constexpr double least_share = 0.25, least_gain = 1;  // of what is confused, and edges: what a point must mend
+constexpr double least_share = 0.1, least_gain = 1;  // of what is confused, and edges: what a point must mend
 constexpr float same_side = 0.3f;
 constexpr size_t points_per_place = 8;    // of a frame, at the least: where all is torn, points for all would not mend it
 constexpr float near_by = 24;             // from a place on points count for less and less
@@ -39,7 +43,7 @@ std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded,
         for (size_t i = part * batch; i < std::min(all, (part + 1) * batch); ++i) {
             const glm::vec3& x = i < own ? frame.mesh.positions[i] : decoded.positions[i - own];
             const SurfaceIndex& other = i < own ? decoded_index : frame.index;
-            off[i] = {x, other.within(x, beyond) ? 0 : std::min(other.closest(x, 4 * beyond).distance, 4 * beyond)};
+            off[i] = {x, other.within(x, beyond) ? 0 : std::min(other.closest(x, farthest * frame.edge).distance, farthest * frame.edge)};
         }
     });
     std::erase_if(off, [](const OffSurface& o) { return o.distance == 0; });
@@ -60,18 +64,19 @@ float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most) {
 /// A torn place: probes in it whose side is known, and points that could be born there.
 struct Place {
     glm::vec3 centre;
+    float radius;
     std::vector<float> x, y, z, depth;
     std::vector<SurfacePoint> candidates;
 };
 
-void place_probes(const SurfaceFrame& frame, Place& place) {
-    const int reach = int(place_radius / probe_spacing);
+void find_probes(const SurfaceFrame& frame, Place& place) {
+    const int reach = int(std::lround(1 / probe_spacing));
     for (int k = -reach; k <= reach; ++k)
         for (int j = -reach; j <= reach; ++j)
             for (int i = -reach; i <= reach; ++i) {
                 if (i * i + j * j + k * k > reach * reach) continue;
-                const glm::vec3 x = place.centre + probe_spacing * frame.edge * glm::vec3(i, j, k);
-                const float depth = depth_at(frame, x, most_depth * frame.edge);
+                const glm::vec3 x = place.centre + probe_spacing * place.radius * glm::vec3(i, j, k);
+                const float depth = depth_at(frame, x, most_depth * place.radius);
                 if (std::fabs(depth) < least_depth * frame.edge) continue;
                 place.x.push_back(x.x), place.y.push_back(x.y), place.z.push_back(x.z), place.depth.push_back(depth);
             }
@@ -79,12 +84,12 @@ void place_probes(const SurfaceFrame& frame, Place& place) {
 
 void find_candidates(const SurfaceFrame& frame, Place& place) {
     std::vector<VertexTree::Found> found;
-    frame.tree.within(place.centre, place_radius * frame.edge, found);
+    frame.tree.within(place.centre, place.radius, found);
     std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.distance2 < b.distance2; });
     for (const auto& f : found) {
         SurfacePoint p{frame.mesh.positions[f.vertex], frame.mesh.normals[f.vertex], {}};
         const bool taken = std::any_of(place.candidates.begin(), place.candidates.end(), [&](const SurfacePoint& q) {
-            return glm::distance(p.position, q.position) < candidates_apart * frame.edge && glm::dot(p.normal, q.normal) > same_side;
+            return glm::distance(p.position, q.position) < candidates_apart * place.radius && glm::dot(p.normal, q.normal) > same_side;
         });
         if (taken || !settle(frame, point_radius * frame.edge, p)) continue;
         place.candidates.push_back(p);
@@ -105,12 +110,12 @@ std::vector<SurfacePoint> points_around(const std::vector<SurfacePoint>& points,
     return around;
 }
 
-/// Sum over the probes that the points decode to the wrong side of how deep they lie in theirs, edges.
+/// Integral, over the place's liquid and air that the points decode as the other, of its depth: edges, per probe of a least place.
 double confusion(const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points) {
     const PointField decoded(points);
     std::vector<float> value(place.x.size());
     std::vector<uint32_t> candidates(points.size());
-    const glm::vec3 reach(place_radius * frame.edge), lower = place.centre - reach, upper = place.centre + reach;
+    const glm::vec3 reach(place.radius), lower = place.centre - reach, upper = place.centre + reach;
     const surface::Box box{{lower.x, lower.y, lower.z}, {upper.x, upper.y, upper.z}};
     const uint32_t found = surface::gather(decoded.field, box, candidates.data(), uint32_t(candidates.size()));
     surface::evaluate(decoded.field, candidates.data(), found, place.x.data(), place.y.data(), place.z.data(), uint32_t(value.size()),
@@ -118,7 +123,7 @@ double confusion(const SurfaceFrame& frame, const Place& place, const std::vecto
     double sum = 0;
     for (size_t i = 0; i < value.size(); ++i)
         if ((value[i] < 0) != (place.depth[i] > 0)) sum += std::fabs(place.depth[i]) / frame.edge;
-    return sum;
+    return sum * std::pow(place.radius / (least_radius * frame.edge), 3);
 }
 
 /// Takes candidates that mend the place, best first, into `points`.
@@ -147,14 +152,14 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
 std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs) {
     if (points.empty() || frame.mesh.triangles.empty()) return {};
     std::vector<SurfacePoint> all = points;
-    std::vector<glm::vec3> seen;
+    std::vector<Place> seen;
     for (const OffSurface& off : find_off(frame, mesh_points(points, frame.edge, jobs), beyond, jobs)) {
-        const auto near = [&](const glm::vec3& x) { return glm::distance(x, off.position) < 2 * frame.edge; };
+        const auto near = [&](const Place& p) { return glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(seen.begin(), seen.end(), near)) continue;
         if (seen.size() > points.size() / points_per_place) break;
-        seen.push_back(off.position);
-        Place place{off.position, {}, {}, {}, {}, {}};
-        place_probes(frame, place), find_candidates(frame, place);
+        Place& place = seen.emplace_back();
+        place.centre = off.position, place.radius = std::max(least_radius * frame.edge, off.distance + around_void * frame.edge);
+        find_probes(frame, place), find_candidates(frame, place);
         repair(frame, place, all, jobs);
     }
     std::vector<Path> born(all.size() - points.size());

@@ -87,12 +87,11 @@ TEST_CASE("at a spur a point is born where others would stand too close") {
     REQUIRE(born.size() == 1);
     CHECK(born[0].position == frame.mesh.positions[vertex]);
 
-    // With one close by, only where the rule for spurs leaves so little room.
+    // Not with one close by.
     std::vector<SurfacePoint> close = points;
     const glm::vec3 n = glm::normalize(frame.mesh.positions[vertex] + glm::vec3(0, 0, 1.2f * frame.edge));
     close.push_back({radius * n, n, {}});
     CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge).empty());
-    CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge, 0.5f).size() == 1);
 }
 
 TEST_CASE("what is torn is repaired by points that leave less off the source, the same with any number of threads") {
@@ -101,9 +100,13 @@ TEST_CASE("what is torn is repaired by points that leave less off the source, th
     const float beyond = 0.7f * frame.edge;
     CHECK(repair_surface(frame, 0, whole, beyond, 2).empty());
 
-    std::vector<SurfacePoint> torn;  // a lid is gone: the ball is cut flat there
+    // The ball is cut flat there; the second void is farther from the source than a few edges.
+    float rim = 0.4f;
+    SUBCASE("a lid") {}
+    SUBCASE("most of the ball") { rim = -0.4f; }
+    std::vector<SurfacePoint> torn;
     for (const SurfacePoint& p : whole)
-        if (p.normal.x < 0.4f) torn.push_back(p);
+        if (p.normal.x < rim) torn.push_back(p);
     const auto farthest = [&](const std::vector<SurfacePoint>& points) {
         const Mesh decoded = mesh_points(points, frame.edge);
         return surface_distance(frame.mesh, frame.index, decoded, SurfaceIndex(decoded)).max;
