@@ -12,22 +12,24 @@
 namespace rill::cooker {
 namespace {
 
-// Lengths in edges.
-constexpr float least_radius = 2.5f, around_void = 1.5f;  // of a place: around the vertex that is farthest off; more than it is off
-constexpr float least_depth = 0.2f;       // of a probe: nearer to the surface its side is in doubt
+// Edges.
+constexpr float least_radius = 2.5f;      // of a place, around the vertex that is farthest off
+constexpr float around_void = 1.5f;       // what a place's radius is more than that vertex is off
 constexpr float farthest = 6;             // how far off is told
-// Lengths in radii of a place.
+constexpr float least_depth = 0.2f;       // of a probe: nearer to the surface its side is in doubt
+constexpr float point_radius = 1.6f;      // of the fit that places a point
+constexpr float near_by = 24;             // from a place on points count for less and less
+// Radii of a place.
 constexpr float probe_spacing = 0.2f;
 constexpr float most_depth = 0.8f;        // of a probe
-constexpr float candidates_apart = 0.32f;  // unless they face apart
+constexpr float candidates_apart = 0.32f; // unless they face apart
 constexpr float cleared = 0.8f;           // places begin no nearer to an earlier one
+
 constexpr size_t most_candidates = 12;
 constexpr int most_repairs = 4;           // of a place
-constexpr float point_radius = 1.6f;      // of the fit that places a point
-constexpr double least_share = 0.1, least_gain = 1;  // of what is confused, and edges: what a point must mend
-constexpr float same_side = 0.3f;
+constexpr double least_share = 0.1, least_gain = 1;  // of confusion(): what a point must mend
+constexpr float same_side = 0.3f;         // cosine
 constexpr size_t points_per_place = 8;    // of a frame, at the least: where all is torn, points for all would not mend it
-constexpr float near_by = 24;             // from a place on points count for less and less
 
 struct OffSurface {
     glm::vec3 position;
@@ -43,7 +45,8 @@ std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded,
         for (size_t i = part * batch; i < std::min(all, (part + 1) * batch); ++i) {
             const glm::vec3& x = i < own ? frame.mesh.positions[i] : decoded.positions[i - own];
             const SurfaceIndex& other = i < own ? decoded_index : frame.index;
-            off[i] = {x, other.within(x, beyond) ? 0 : std::min(other.closest(x, farthest * frame.edge).distance, farthest * frame.edge)};
+            const float most = farthest * frame.edge;
+            off[i] = {x, other.within(x, beyond) ? 0 : std::min(other.closest(x, most).distance, most)};
         }
     });
     std::erase_if(off, [](const OffSurface& o) { return o.distance == 0; });

@@ -13,7 +13,7 @@
 namespace rill::cooker {
 namespace {
 
-constexpr uint32_t lanes = 4;               // children of a node, triangles of a leaf
+constexpr uint32_t lanes = 4;             // children of a node, triangles of a leaf
 constexpr uint32_t worth_sharing = 8192;  // triangles
 constexpr uint32_t leaf_bit = 0x80000000u;  // child = leaf_bit | leaf, else a node
 constexpr uint32_t no_child = ~0u;
@@ -81,8 +81,8 @@ Lanes squared_distances(const Node& node, const glm::vec3& x) {
     return sum;
 }
 
-/// Squared distances of x from the triangles of a leaf: from the nearest edge or, over the inside, from the plane. Whatever
-/// rounding makes of a sliver, some point of the triangle has that distance.
+/// Squared distances of x from the triangles of a leaf: from the nearest edge or, over the inside, from the plane.
+/// Whatever rounding makes of a sliver, some point of the triangle has that distance.
 Lanes squared_distances(const Leaf& leaf, const glm::vec3& x) {
     const Lanes ax = leaf.a[0] - x.x, ay = leaf.a[1] - x.y, az = leaf.a[2] - x.z;
     const Lanes bx = leaf.b[0], by = leaf.b[1], bz = leaf.b[2], cx = leaf.c[0], cy = leaf.c[1], cz = leaf.c[2];
