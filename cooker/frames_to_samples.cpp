@@ -94,7 +94,7 @@ std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residua
     for (uint32_t v : bad) {
         const glm::vec3 velocity = frame.mesh.velocities.empty() ? glm::vec3(0) : frame.mesh.velocities[v];
         const SurfacePoint p{frame.mesh.positions[v], frame.mesh.normals[v], velocity};
-        const float room = residual.spur[v] ? room_for(tree, points, p, least, least) : room_for(tree, points, p, least, most);
+        const float room = room_for(tree, points, p, least, residual.spur[v] ? least : most);
         if (room <= 0 || !disks.free(p, room)) continue;
         disks.add(p);
         born.push_back(p);
