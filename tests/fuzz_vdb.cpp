@@ -6,6 +6,11 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
+#include <tbb/global_control.h>
+
+// The reader runs in a child of this process, where threads that OpenVDB may have started here would be missing.
+static const tbb::global_control alone(tbb::global_control::max_allowed_parallelism, 1);
+
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     openvdb::initialize();
     const auto ball = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(0.2f, {0, 0, 0}, 0.05f);

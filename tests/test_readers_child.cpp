@@ -3,6 +3,8 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <unistd.h>
+
 #include <csignal>
 #include <cstdlib>
 
@@ -14,7 +16,7 @@ using namespace rill::cooker;
 
 namespace {
 
-constexpr ChildLimits usual = {uint64_t(1) << 30, 60};
+constexpr ChildLimits usual = {uint64_t(1) << 30, 60, 600};
 
 std::string cause_of(const std::function<Mesh()>& work, const ChildLimits& limits = usual) {
     try {
@@ -45,14 +47,18 @@ TEST_CASE("failures are told in one short line") {
     CHECK(cause_of([]() -> Mesh { throw std::runtime_error(std::string(1 << 20, 'x')); }).size() < 400);
 }
 
-TEST_CASE("a crash, an endless loop and a hunger for memory end there") {
+TEST_CASE("a crash, an endless loop, an endless wait and a hunger for memory end there") {
     const auto forever = []() -> Mesh {
         for (volatile bool go = true; go;) {}
         return {};
     };
     CHECK(cause_of([]() -> Mesh { std::_Exit(3); }) == "f1.vdb: not usable: reading it crashes");
     CHECK(cause_of([] { return std::raise(SIGKILL) ? Mesh() : Mesh(); }) == "f1.vdb: not usable: reading it crashes");
-    CHECK(cause_of(forever, {usual.memory, 1}) == "f1.vdb: not usable: reading takes too long");
+    CHECK(cause_of(forever, {usual.memory, 1, 600}) == "f1.vdb: not usable: reading takes too long");
+    const auto stuck = []() -> Mesh {
+        for (;;) pause();
+    };
+    CHECK(cause_of(stuck, {usual.memory, 60, 1}) == "f1.vdb: not usable: reading takes too long");
     const auto eat = [] {
         Mesh mesh;
         mesh.positions.resize((size_t(1) << 31) / sizeof(glm::vec3));

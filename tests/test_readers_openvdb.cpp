@@ -14,9 +14,14 @@ using namespace rill::cooker;
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
+#include <tbb/global_control.h>
+
 #include <cmath>
 
 namespace {
+
+// The reader runs in a child of this process, where threads that OpenVDB may have started here would be missing.
+const tbb::global_control alone(tbb::global_control::max_allowed_parallelism, 1);
 
 constexpr float radius = 0.5f, voxel = 0.05f;
 

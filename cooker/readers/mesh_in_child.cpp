@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "readers/mesh_in_child.h"
 
+#include <poll.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <fstream>
@@ -15,11 +17,15 @@
 namespace rill::cooker {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr size_t longest_cause = 300;  // of what a library says of a damaged file: it may quote from it at length
+constexpr const char* too_long = "reading takes too long";
 
 /// The process's own end of a pipe; closed when it goes.
 struct End {
     int file = -1;
+    Clock::time_point deadline = Clock::time_point::max();  // for get
     ~End() { close(); }
     void close() {
         if (file >= 0) ::close(file);
@@ -38,12 +44,20 @@ struct End {
     bool get(void* data, size_t size) const {
         char* at = static_cast<char*>(data);
         while (size > 0) {
+            if (!comes()) return false;
             const ssize_t done = ::read(file, at, size);
             if (done < 0 && errno == EINTR) continue;
             if (done <= 0) return false;
             at += done, size -= size_t(done);
         }
         return true;
+    }
+    bool late() const { return Clock::now() >= deadline; }
+    /// Waits until there is something to read, or the end.
+    bool comes() const {
+        for (pollfd poll{file, POLLIN, 0}; !late();)
+            if (::poll(&poll, 1, 100) > 0) return true;
+        return false;
     }
     template <class T>
     bool put_all(const std::vector<T>& items) const {
@@ -90,7 +104,7 @@ void serve(const End& out, const std::function<Mesh()>& work) {
 std::string how_it_ended(pid_t child) {
     int status = 0;
     while (waitpid(child, &status, 0) < 0 && errno == EINTR) {}
-    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return "reading takes too long";
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) return too_long;
     return "reading it crashes";
 }
 
@@ -116,14 +130,18 @@ Mesh mesh_in_child(const std::filesystem::path& path, const ChildLimits& limits,
         }
         out.close();
     }
+    in.deadline = Clock::now() + std::chrono::seconds(limits.wait);
     std::vector<char> cause;
     Mesh mesh;
     const bool answered = in.get_all(cause);
     const bool whole = answered && cause.empty() && in.get_all(mesh.positions) && in.get_all(mesh.normals) && in.get_all(mesh.velocities) && in.get_all(mesh.triangles);
+    const bool stuck = !whole && in.late();
+    if (stuck) kill(child, SIGKILL);
     in.close();  // a child still writing ends too
     const std::string end = how_it_ended(child);
-    if (!whole) throw InputError(path.string() + ": not usable: " + (answered && !cause.empty() ? std::string(cause.begin(), cause.end()) : end));
-    return mesh;
+    if (whole) return mesh;
+    const std::string why = answered && !cause.empty() ? std::string(cause.begin(), cause.end()) : stuck ? too_long : end;
+    throw InputError(path.string() + ": not usable: " + why);
 }
 
 }  // namespace rill::cooker

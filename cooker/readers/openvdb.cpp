@@ -100,7 +100,8 @@ Mesh read_vdb(const std::filesystem::path& path, const ReadOptions& options) {
     std::error_code error;
     const uint64_t size = std::filesystem::file_size(path, error);
     if (error) throw InputError(path.string() + ": " + error.message());
-    const ChildLimits limits = {(uint64_t(1) << 30) + 64 * size, uint32_t(60 + (size >> 20))};  // tiles and packed leaves unfold
+    const uint32_t seconds = uint32_t(60 + (size >> 20));
+    const ChildLimits limits = {(uint64_t(1) << 30) + 64 * size, seconds, 10 * seconds};  // tiles and packed leaves unfold
     return mesh_in_child(path, limits, [&] { return parse(path.string(), options); });
 }
 
