@@ -14,6 +14,8 @@ constexpr int coding_rounds = 2;
 constexpr int last_mendings = 3;  // README.md, "Spurs"
 // Tolerances: what bears points while tracks grow (the field off the source's vertices, the decoded mesh off the source), and mends.
 constexpr float missed_by = 1, spur_beyond = 4, repair_beyond = 2.5f;
+constexpr float stray_beyond = 1.5f;  // at an end of a life
+constexpr int trimmings = 3;
 constexpr int most_rounds = 8;    // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
@@ -230,6 +232,30 @@ void drop_fleeting(Window& window, CodedWindow& coded, const WindowGoal& goal) {
     take_out(window.paths), take_out(coded.tracks), take_out(coded.decoded);
 }
 
+/// Lives whose first or last samples coding has taken off the surface end sooner: one such point opens a void that no birth
+/// beside it closes. Which: their coefficients are those of longer lives.
+std::vector<uint32_t> trim_strays(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+    std::vector<uint32_t> trimmed;
+    for (uint32_t i = 0; i < window.paths.size(); ++i) {
+        Path& path = window.paths[i];
+        const int birth = path.birth, death = path.death;
+        const auto stray = [&](int s) {
+            return !window.frames[size_t(s)]->index.within(coded.decoded[i].position[size_t(s - birth)], stray_beyond * goal.tolerance);
+        };
+        const bool leaves = death == window.samples() - 1;
+        while (!path.continues && path.birth < path.death && stray(path.birth)) ++path.birth;
+        while (!leaves && path.birth < path.death && stray(path.death)) --path.death;
+        if (path.birth == birth && path.death == death) continue;
+        const auto keep = [&](auto& of_samples) {
+            of_samples.erase(of_samples.begin() + (path.death + 1 - birth), of_samples.end());
+            of_samples.erase(of_samples.begin(), of_samples.begin() + (path.birth - birth));
+        };
+        keep(path.at), keep(path.correction), keep(path.tilt);
+        trimmed.push_back(i);
+    }
+    return trimmed;
+}
+
 TrackSamples samples_of(const Window& window, const Path& path) {
     TrackSamples samples;
     samples.birth = uint8_t(path.birth), samples.death = uint8_t(path.death);
@@ -285,10 +311,10 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     CodedWindow coded;
     coded.quantiser = goal.quantiser;
     if (window.slips) coded.quantiser.slip_step = slip_step_of(window);
-    const auto code = [&](size_t first) {
+    const auto code = [&](const std::vector<uint32_t>& ids) {
         coded.tracks.resize(window.paths.size()), coded.decoded.resize(window.paths.size());
-        parallel_for(window.paths.size() - first, goal.jobs, [&](size_t k) {
-            const size_t i = first + k;
+        parallel_for(ids.size(), goal.jobs, [&](size_t k) {
+            const size_t i = ids[k];
             const Path& path = window.paths[i];
             coded.tracks[i] = quantise_track(samples_of(window, path), coded.quantiser, goal.origin, tables,
                                              [&](uint32_t sample, const glm::vec3& x, const glm::vec3& axis) {
@@ -297,10 +323,15 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
             coded.decoded[i] = dequantise_track(coded.tracks[i], coded.quantiser, goal.origin, tables);
         });
     };
-    code(0);
+    const auto code_from = [&](size_t first) {
+        std::vector<uint32_t> ids(window.paths.size() - first);
+        std::iota(ids.begin(), ids.end(), uint32_t(first));
+        code(ids);
+    };
+    code_from(0);
     const size_t grown = window.paths.size();
     mend(window, coded, goal);
-    code(grown);
+    code_from(grown);
     drop_fleeting(window, coded, goal);
     for (int round = 0; round < coding_rounds; ++round) {
         parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
@@ -310,13 +341,14 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
             const Residual residual = measure_residual(frame, points);
             correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
         });
-        code(0);
+        code_from(0);
     }
+    for (int round = 0; round < trimmings; ++round) code(trim_strays(window, coded, goal));
     // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
     for (int round = 0; round < last_mendings; ++round) {
         const size_t mended = window.paths.size();
         mend(window, coded, goal);
-        code(mended);
+        code_from(mended);
     }
     for (const TrackSamples& drop : track_drops(window)) {
         coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));

@@ -27,7 +27,7 @@ constexpr float cleared = 0.8f;           // places begin no nearer to an earlie
 
 constexpr size_t most_candidates = 12;
 constexpr int most_repairs = 4;           // of a place
-constexpr double least_share = 0.1, least_gain = 1;  // of confusion(): what a point must mend
+constexpr double least_share = 0.1, least_gain = 1, most_gain = 4;  // of confusion(): what a point must mend; a wide void is closed by small parts
 constexpr float same_side = 0.3f;         // cosine
 constexpr size_t points_per_place = 8;    // of a frame, at the least: where all is torn, points for all would not mend it
 
@@ -142,7 +142,7 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
             then[i] = confusion(frame, place, with);
         });
         const auto best = std::min_element(then.begin(), then.end());
-        if (now - *best < std::max(least_gain, least_share * now)) return;
+        if (now - *best < std::clamp(least_share * now, least_gain, most_gain)) return;
         now = *best;
         const auto chosen = place.candidates.begin() + (best - then.begin());
         around.push_back(*chosen), points.push_back(*chosen);
