@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which tracks a window keeps: brief ones that their neighbours make up for go, those that mend a frame end when it is mended.
+// Which tracks a window keeps: brief ones that their neighbours make up for go, those that mend a frame end when it is
+// mended, and ends that coding takes off the surface are cut.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
@@ -121,4 +122,30 @@ TEST_CASE("tracks that mend a frame end when it is mended") {
         if (path.birth == bare) ++mending, ended += path.death <= bare + 1;
     CHECK(mending > 5);
     CHECK(ended > mending / 2);
+}
+
+TEST_CASE("ends of lives that are coded off the surface are cut, and no others") {
+    Window window = standing_ball();
+    const WindowGoal goal = goal_of(window);
+    cover(window);
+    const uint32_t first = uint32_t(window.paths.size());
+    const auto add = [&](size_t like, int birth, int death, int astray) {
+        Path path = part_of(window.paths[like], birth, death);
+        SurfacePoint& p = path.at[size_t(astray - birth)];
+        p.position += 6 * window.frames[0]->edge * p.normal;
+        window.paths.push_back(path);
+    };
+    add(0, 3, samples - 1, 3), add(1, 0, 8, 8), add(2, 3, 8, 3), add(3, 2, samples - 1, samples - 1);
+    const CodedWindow coded = code_tracks(window, goal, tables());
+    const auto lives = [&](uint32_t i, int birth, int death) {
+        const TrackSamples& track = coded.decoded[first + i];
+        return window.paths[first + i].birth == birth && window.paths[first + i].death == death && track.birth == birth && track.death == death &&
+               track.position.size() == size_t(death - birth + 1) && window.paths[first + i].at.size() == track.position.size();
+    };
+    CHECK(lives(0, 4, samples - 1));
+    CHECK(lives(1, 0, 7));
+    CHECK(lives(2, 4, 8));
+    CHECK(lives(3, 2, samples - 1));  // goes on in the next window
+    for (uint32_t i = 0; i < 3; ++i)
+        for (const glm::vec3& x : coded.decoded[first + i].position) CHECK(window.frames[0]->index.within(x, 1.5f * goal.tolerance));
 }
