@@ -174,18 +174,24 @@ Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, in
 }
 
 /// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+/// `changed`: the samples to look at (others have been found whole, or beyond mending); afterwards those with a new path.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std::vector<bool>& changed) {
     const size_t first = window.paths.size();
+    const auto grown_at = [&](int s) {
+        return std::any_of(window.paths.begin() + ptrdiff_t(first), window.paths.end(), [&](const Path& path) { return path.alive(s); });
+    };
     // At a border with the window before, too: births there come at once, where the surface is that window's, mended, anyway.
     for (int s = 0; s < window.samples(); ++s) {
         if (s > 0) {
             carry_on(window, s, goal.jobs, first);
             thin_out(window, s, goal, mended_at(window, coded, first, s), first);
         }
+        if (!changed[size_t(s)] && !grown_at(s)) continue;
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         for (Path& path : repair_surface(*window.frames[size_t(s)], s, points, repair_beyond * goal.tolerance, goal.jobs))
             window.paths.push_back(std::move(path));
     }
+    for (int s = 0; s < window.samples(); ++s) changed[size_t(s)] = grown_at(s);
 }
 
 /// Takes out tracks of few frames that their neighbours nearly make up for in each of them: the least missed first, and of
@@ -330,7 +336,8 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     };
     code_from(0);
     const size_t grown = window.paths.size();
-    mend(window, coded, goal);
+    std::vector<bool> changed(window.frames.size(), true);
+    mend(window, coded, goal, changed);
     code_from(grown);
     drop_fleeting(window, coded, goal);
     for (int round = 0; round < coding_rounds; ++round) {
@@ -345,9 +352,10 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     }
     for (int round = 0; round < trimmings; ++round) code(trim_strays(window, coded, goal));
     // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
+    changed.assign(window.frames.size(), true);
     for (int round = 0; round < last_mendings; ++round) {
         const size_t mended = window.paths.size();
-        mend(window, coded, goal);
+        mend(window, coded, goal, changed);
         code_from(mended);
     }
     for (const TrackSamples& drop : track_drops(window)) {
