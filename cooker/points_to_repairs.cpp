@@ -18,7 +18,8 @@ constexpr float around_void = 1.5f;       // what a place's radius is more than 
 constexpr float farthest = 6;             // how far off is told
 constexpr float least_depth = 0.2f;       // of a probe: nearer to the surface its side is in doubt
 constexpr float point_radius = 1.6f;      // of the fit that places a point
-constexpr float near_by = 24;             // from a place on points count for less and less
+constexpr float near_by = 24;             // from a place on points count for less and less,
+constexpr float wide = 4;                 // but all of them where it is that wide: their winding number decides there
 // Radii of a place.
 constexpr float probe_spacing = 0.2f;
 constexpr float most_depth = 0.8f;        // of a probe
@@ -131,7 +132,8 @@ double confusion(const SurfaceFrame& frame, const Place& place, const std::vecto
 
 /// Takes candidates that mend the place, best first, into `points`.
 void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
-    std::vector<SurfacePoint> around = points_around(points, place.centre, near_by * frame.edge);
+    const bool all = place.radius > wide * frame.edge;
+    std::vector<SurfacePoint> around = all ? points : points_around(points, place.centre, near_by * frame.edge);
     double now = confusion(frame, place, around);
     std::vector<double> then;
     for (int round = 0; round < most_repairs && !place.candidates.empty(); ++round) {
