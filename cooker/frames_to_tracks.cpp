@@ -132,11 +132,8 @@ size_t bear_tracks(Window& window, int sample, const Residual& residual, const s
     std::vector<Path> paths(births.size());
     parallel_for(births.size(), goal.jobs, [&](size_t i) {
         SurfacePoint p = births[i];
-        Path& path = paths[i];
-        path.radius = std::max(1.6f * frame.edge, 0.7f * spacing_at(all, tree, p, 8 * frame.edge));
-        if (!settle(frame, path.radius, p)) return;
-        path.birth = path.death = sample;
-        path.at = {p}, path.correction = {0.f}, path.tilt = {glm::vec2(0)};
+        const float radius = std::max(1.6f * frame.edge, 0.7f * spacing_at(all, tree, p, 8 * frame.edge));
+        if (settle(frame, radius, p)) paths[i] = Path::born(p, radius, sample);
     });
     const size_t before = window.paths.size();
     for (Path& path : paths)

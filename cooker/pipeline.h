@@ -36,6 +36,8 @@ struct Path {
     std::vector<SurfacePoint> at;        ///< on the smoothed source surface, death − birth + 1
     std::vector<float> correction;       ///< along the normal: what makes the decoded surface fit best, metres
     std::vector<glm::vec2> tilt;         ///< likewise of the normal, in its tangent frame
+    /// One that has just been born, of a single sample.
+    static Path born(const SurfacePoint& at, float radius, int sample);
     bool alive(int sample) const { return sample >= birth && sample <= death; }
     /// Corrected point at a sample of its life: what is coded.
     SurfacePoint target(int sample) const;

@@ -38,19 +38,18 @@ struct OffSurface {
 };
 /// Vertices of either surface that are farther than `beyond` from the other, worst first.
 std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded, float beyond, int jobs) {
-    const SurfaceIndex decoded_index(decoded, jobs);
-    const size_t own = frame.mesh.positions.size(), all = own + decoded.positions.size();
-    std::vector<OffSurface> off(all);
-    constexpr size_t batch = 1024;
-    parallel_for((all + batch - 1) / batch, jobs, [&](size_t part) {
-        for (size_t i = part * batch; i < std::min(all, (part + 1) * batch); ++i) {
-            const glm::vec3& x = i < own ? frame.mesh.positions[i] : decoded.positions[i - own];
-            const SurfaceIndex& other = i < own ? decoded_index : frame.index;
+    std::vector<OffSurface> off;
+    const auto look = [&](const std::vector<glm::vec3>& positions, const SurfaceIndex& other) {
+        const std::vector<uint32_t> found = find_beyond(other, positions, beyond, jobs);
+        const size_t before = off.size();
+        off.resize(before + found.size());
+        parallel_for(found.size(), jobs, [&](size_t i) {
+            const glm::vec3& x = positions[found[i]];
             const float most = farthest * frame.edge;
-            off[i] = {x, other.within(x, beyond) ? 0 : std::min(other.closest(x, most).distance, most)};
-        }
-    });
-    std::erase_if(off, [](const OffSurface& o) { return o.distance == 0; });
+            off[before + i] = {x, std::min(other.closest(x, most).distance, most)};
+        });
+    };
+    look(frame.mesh.positions, SurfaceIndex(decoded, jobs)), look(decoded.positions, frame.index);
     std::stable_sort(off.begin(), off.end(), [](const OffSurface& a, const OffSurface& b) { return a.distance > b.distance; });
     return off;
 }
@@ -167,11 +166,8 @@ std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const st
         find_probes(frame, place), find_candidates(frame, place);
         repair(frame, place, all, jobs);
     }
-    std::vector<Path> born(all.size() - points.size());
-    for (size_t i = 0; i < born.size(); ++i) {
-        born[i].radius = point_radius * frame.edge, born[i].birth = born[i].death = sample;
-        born[i].at = {all[points.size() + i]}, born[i].correction = {0.f}, born[i].tilt = {glm::vec2(0)};
-    }
+    std::vector<Path> born;
+    for (size_t i = points.size(); i < all.size(); ++i) born.push_back(Path::born(all[i], point_radius * frame.edge, sample));
     return born;
 }
 

@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "parallel.h"
+
 namespace rill::cooker {
 namespace {
 
@@ -85,6 +87,18 @@ constexpr int shift = 23 - mantissa_bits;                // a float's bits, cut 
 constexpr size_t bins = (0x7f800000u >> shift) + 1;      // up to and with infinity
 
 }  // namespace
+
+std::vector<uint32_t> find_beyond(const SurfaceIndex& surface, const std::vector<glm::vec3>& positions, float beyond, int jobs) {
+    std::vector<uint8_t> far(positions.size());
+    constexpr size_t batch = 1024;
+    parallel_for((far.size() + batch - 1) / batch, jobs, [&](size_t part) {
+        for (size_t i = part * batch; i < std::min(far.size(), (part + 1) * batch); ++i) far[i] = !surface.within(positions[i], beyond);
+    });
+    std::vector<uint32_t> found;
+    for (uint32_t i = 0; i < far.size(); ++i)
+        if (far[i]) found.push_back(i);
+    return found;
+}
 
 void DistanceHistogram::add(float distance, double weight) {
     if (area.empty()) area.resize(bins);

@@ -32,6 +32,9 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
+/// Which of the positions stand `beyond` metres or more off the surface, ascending.
+std::vector<uint32_t> find_beyond(const SurfaceIndex& surface, const std::vector<glm::vec3>& positions, float beyond, int jobs);
+
 struct Topology {
     uint32_t open_edges = 0, non_manifold_edges = 0, components = 0;
     uint32_t large_components = 0;  ///< of more than large_cells cells

@@ -45,6 +45,13 @@ TangentFrame tangent_frame(const glm::vec3& n) {
 
 }  // namespace
 
+Path Path::born(const SurfacePoint& at, float radius, int sample) {
+    Path path;
+    path.radius = radius, path.birth = path.death = sample;
+    path.at = {at}, path.correction = {0.f}, path.tilt = {glm::vec2(0)};
+    return path;
+}
+
 SurfacePoint Path::target(int sample) const {
     const size_t k = size_t(sample - birth);
     SurfacePoint p = at[k];
@@ -90,19 +97,14 @@ Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePo
 void mark_spurs(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, Residual& residual, int jobs) {
     if (frame.mesh.triangles.empty()) return;
     const Mesh decoded = mesh_points(points, frame.edge, jobs);
-    std::vector<uint32_t> nearest(decoded.positions.size(), ~0u);
-    constexpr size_t batch = 1024;
-    parallel_for((nearest.size() + batch - 1) / batch, jobs, [&](size_t part) {
-        for (size_t i = part * batch; i < std::min(nearest.size(), (part + 1) * batch); ++i) {
-            const glm::vec3& x = decoded.positions[i];
-            if (frame.index.within(x, beyond)) continue;
-            const SurfaceIndex::Hit source = frame.index.closest(x, INFINITY);
-            const glm::vec3& b = source.barycentric;
-            nearest[i] = frame.mesh.triangles[source.triangle][b.x >= b.y && b.x >= b.z ? 0 : b.y >= b.z ? 1 : 2];
-        }
+    const std::vector<uint32_t> spurs = find_beyond(frame.index, decoded.positions, beyond, jobs);
+    std::vector<uint32_t> nearest(spurs.size());
+    parallel_for(spurs.size(), jobs, [&](size_t i) {
+        const SurfaceIndex::Hit source = frame.index.closest(decoded.positions[spurs[i]], INFINITY);
+        const glm::vec3& b = source.barycentric;
+        nearest[i] = frame.mesh.triangles[source.triangle][b.x >= b.y && b.x >= b.z ? 0 : b.y >= b.z ? 1 : 2];
     });
-    for (uint32_t v : nearest)
-        if (v != ~0u) residual.spur[v] = 1;
+    for (uint32_t v : nearest) residual.spur[v] = 1;
 }
 
 Surplus measure_surplus(const std::vector<SurfacePoint>& points, int jobs) {
