@@ -19,6 +19,7 @@ constexpr float farthest = 6;             // how far off is told
 constexpr float least_depth = 0.2f;       // of a probe: nearer to the surface its side is in doubt
 constexpr float point_radius = 1.6f;      // of the fit that places a point
 constexpr float near_by = 24;             // from a place on points count for less and less,
+constexpr float least_near = 6;           // from nearer on where `enough_near` are,
 constexpr float wide = 4;                 // but all of them where it is that wide: their winding number decides there
 // Radii of a place.
 constexpr float probe_spacing = 0.2f;
@@ -26,6 +27,8 @@ constexpr float most_depth = 0.8f;        // of a probe
 constexpr float candidates_apart = 0.32f; // unless they face apart
 constexpr float cleared = 0.8f;           // places begin no nearer to an earlier one
 
+// A trial's time is that of its points: without this limit cooks of violent liquid take 12 to 26 % more of it, for the same figures.
+constexpr size_t enough_near = 100;
 constexpr size_t most_candidates = 12;
 constexpr int most_repairs = 4;           // of a place
 constexpr double least_share = 0.1, least_gain = 1, most_gain = 4;  // of confusion(): what a point must mend; a wide void is closed by small parts
@@ -100,9 +103,19 @@ void find_candidates(const SurfaceFrame& frame, Place& place) {
     }
 }
 
+/// As far from x as all points count: metres.
+float near_at(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, const glm::vec3& x) {
+    if (points.size() <= enough_near) return near_by * frame.edge;
+    std::vector<float> away(points.size());
+    for (size_t i = 0; i < away.size(); ++i) away[i] = glm::distance(points[i].position, x);
+    std::nth_element(away.begin(), away.begin() + enough_near, away.end());
+    return std::clamp(away[enough_near], least_near * frame.edge, near_by * frame.edge);
+}
+
 /// All points near x, and ever fewer of those farther away: enough for the winding number, in a time that does not grow with
 /// the frame.
-std::vector<SurfacePoint> points_around(const std::vector<SurfacePoint>& points, const glm::vec3& x, float near) {
+std::vector<SurfacePoint> points_around(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, const glm::vec3& x) {
+    const float near = near_at(frame, points, x);
     std::vector<SurfacePoint> around;
     for (size_t i = 0; i < points.size(); ++i) {
         const float away = glm::distance(points[i].position, x) / near;
@@ -132,7 +145,7 @@ double confusion(const SurfaceFrame& frame, const Place& place, const std::vecto
 /// Takes candidates that mend the place, best first, into `points`.
 void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
     const bool all = place.radius > wide * frame.edge;
-    std::vector<SurfacePoint> around = all ? points : points_around(points, place.centre, near_by * frame.edge);
+    std::vector<SurfacePoint> around = all ? points : points_around(frame, points, place.centre);
     double now = confusion(frame, place, around);
     std::vector<double> then;
     for (int round = 0; round < most_repairs && !place.candidates.empty(); ++round) {
