@@ -36,31 +36,53 @@ Neighbourhood neighbourhood(const Mesher& m, const Tile& tile) {
     return n;
 }
 
-/// Surface cells of row (y, z), y and z from −1; `shift`: bit x tells of cell x − 1.
-uint32_t surface_row(const Neighbourhood& n, int y, int z, bool shift) {
-    const uint32_t k = (y < 0 ? 2u : 0u) | (z < 0 ? 4u : 0u), row = uint32_t((y & 7) + 8 * (z & 7));
-    const uint32_t here = n.tile[k] ? n.tile[k]->surface[row] : 0;
-    if (!shift) return here;
-    const uint32_t beyond = n.tile[k | 1] ? n.tile[k | 1]->surface[row] : 0;
-    return (here << 1 & 0xff) | beyond >> 7;
+/// Surface cells of the tile and of those next to its lower faces: bit x + 1 of row y + 1 + 9 (z + 1), from −1 on.
+struct PaddedCells {
+    uint16_t row[81];
+};
+PaddedCells padded_cells(const Neighbourhood& n) {
+    static constexpr uint8_t none[rows_per_tile] = {};
+    const uint8_t* from[8];
+    for (uint32_t k = 0; k < 8; ++k) from[k] = n.tile[k] ? n.tile[k]->surface : none;
+    PaddedCells cells;
+    for (uint32_t z = 0; z < 9; ++z) {
+        const uint32_t k = z ? 0 : 4, layer = z ? 8 * (z - 1) : 56;
+        uint16_t* row = cells.row + 9 * z;
+        const uint8_t *here = from[k] + layer, *beyond = from[k | 1] + layer;
+        row[0] = uint16_t(from[k | 2][layer + 7] << 1 | from[k | 3][layer + 7] >> 7);
+        for (uint32_t y = 0; y < 8; ++y) row[y + 1] = uint16_t(here[y] << 1 | beyond[y] >> 7);
+    }
+    return cells;
 }
 
-/// Per axis: which lattice edges from the lower corners of the row's cells carry a quad, i.e. change sign
-/// and have all four cells.
+/// Per axis: which lattice edges from the lower corners of the cells carry a quad, i.e. change sign and have all four
+/// cells; by row. All rows at once, without a branch: eight of them are one vector.
 struct QuadMasks {
-    uint32_t axis[3];
+    uint16_t axis[3][rows_per_tile];
 };
-QuadMasks quads_of_row(const Neighbourhood& n, int y, int z) {
-    const uint32_t here = n.tile[0]->surface[y + 8 * z];
-    if (!here) return {};
-    const uint16_t* corner = n.tile[0]->inside + y + 9 * z;
-    const uint32_t back = surface_row(n, y, z, true), down = surface_row(n, y, z - 1, false),
-                   back_down = surface_row(n, y, z - 1, true), left = surface_row(n, y - 1, z, false),
-                   back_left = surface_row(n, y - 1, z, true),
-                   left_down = surface_row(n, y - 1, z - 1, false);
-    return {{(corner[0] ^ uint32_t(corner[0]) >> 1) & here & left & down & left_down,
-             uint32_t(corner[0] ^ corner[1]) & here & back & down & back_down,
-             uint32_t(corner[0] ^ corner[9]) & here & back & left & back_left}};
+QuadMasks quads_of(const Neighbourhood& n) {
+    const PaddedCells cells = padded_cells(n);
+    QuadMasks quads;
+    for (int z = 0; z < tile_cells; ++z) {
+        const uint16_t *own = cells.row + 9 * z + 10, *lower = own - 9, *corner = n.tile[0]->inside + 9 * z;
+        for (int y = 0; y < tile_cells; ++y) {
+            const uint32_t here = own[y] >> 1, back = own[y], left = own[y - 1], down = lower[y], sign = corner[y];
+            const uint32_t beside = here & left >> 1, below = here & back & down;  // cells x − 1 are one bit further up
+            quads.axis[0][y + 8 * z] = uint16_t((sign ^ sign >> 1) & beside & (down & lower[y - 1]) >> 1);
+            quads.axis[1][y + 8 * z] = uint16_t((sign ^ corner[y + 1]) & below & down >> 1);
+            quads.axis[2][y + 8 * z] = uint16_t((sign ^ corner[y + 9]) & beside & back & left);
+        }
+    }
+    return quads;
+}
+uint32_t count_of(const QuadMasks& quads) {
+    uint32_t count = 0;
+    for (const auto& rows : quads.axis)
+        for (uint32_t bits : rows) {
+            bits -= bits >> 1 & 0x55, bits = (bits & 0x33) + (bits >> 2 & 0x33);
+            count += (bits + (bits >> 4)) & 15;
+        }
+    return count;
 }
 
 /// The vertex of a cell on the patch that `edge` belongs to.
@@ -125,14 +147,16 @@ void write_tile(const Mesher& m, Tile& tile) {
         return;
     }
     TileWriter writer{m, tile, neighbourhood(m, tile), out};
-    for (int z = 0; z < tile_cells; ++z)
-        for (int y = 0; y < tile_cells; ++y) {
-            const QuadMasks quads = quads_of_row(writer.near, y, z);
-            const uint32_t liquid = tile.inside[y + 9 * z];
-            for_bits(quads.axis[0], [&](uint32_t x) { writer.quad<0>({int(x), y, z}, liquid >> x & 1); });
-            for_bits(quads.axis[1], [&](uint32_t x) { writer.quad<1>({int(x), y, z}, liquid >> x & 1); });
-            for_bits(quads.axis[2], [&](uint32_t x) { writer.quad<2>({int(x), y, z}, liquid >> x & 1); });
-        }
+    const QuadMasks quads = quads_of(writer.near);
+    for (int row = 0; row < int(rows_per_tile); ++row) {
+        const uint32_t along[3] = {quads.axis[0][row], quads.axis[1][row], quads.axis[2][row]};
+        if (!(along[0] | along[1] | along[2])) continue;
+        const int y = row % 8, z = row / 8;
+        const uint32_t liquid = tile.inside[y + 9 * z];
+        for_bits(along[0], [&](uint32_t x) { writer.quad<0>({int(x), y, z}, liquid >> x & 1); });
+        for_bits(along[1], [&](uint32_t x) { writer.quad<1>({int(x), y, z}, liquid >> x & 1); });
+        for_bits(along[2], [&](uint32_t x) { writer.quad<2>({int(x), y, z}, liquid >> x & 1); });
+    }
 }
 
 bool same_group(const Mesher& m, uint32_t a, uint32_t b) {
@@ -166,13 +190,7 @@ void cover(Tile& tile, const float position[3]) noexcept {
 
 uint32_t count_indices(const Mesher& m, Tile& tile) noexcept {
     if (tile.beside) return join_mixed(m, tile, nullptr, false);
-    const Neighbourhood near = neighbourhood(m, tile);
-    uint32_t quads = 0;
-    for (int z = 0; z < tile_cells; ++z)
-        for (int y = 0; y < tile_cells; ++y)
-            for (uint32_t mask : quads_of_row(near, y, z).axis)
-                for (; mask; mask &= mask - 1) ++quads;
-    return 6 * quads;
+    return 6 * count_of(quads_of(neighbourhood(m, tile)));
 }
 
 void lay_out(Mesher& m) noexcept {
