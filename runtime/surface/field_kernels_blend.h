@@ -27,6 +27,8 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
     return u2 < opposed_reach ? apart : 0.f;
 }
 
+// Tried: u² and heights of find_nearest() kept for the blend (no faster, computing them again costs as much as loading them).
+
 /// The nearest point among those with weight: its normal, the height above its plane and its 1/R². Keeps in the list who
 /// has weight anywhere, a good half of it; returns how many.
 RILL_INLINE uint32_t find_nearest(const Field& f, uint32_t* list, uint32_t count, Batch& b, float* height, float* inverse) {
