@@ -4,6 +4,7 @@
 // compiler must fear to be aliased. Everything is inlined into the entry points of each instruction set.
 #pragma once
 #include <cstdint>
+#include <cstring>
 
 #include "surface/field_kernels.h"
 
@@ -18,6 +19,12 @@ namespace rill::surface::inner {
 
 RILL_INLINE float lesser(float a, float b) { return a < b ? a : b; }
 RILL_INLINE float greater(float a, float b) { return a > b ? a : b; }
+
+RILL_INLINE uint32_t bits_of(float x) {
+    uint32_t bits;
+    std::memcpy(&bits, &x, sizeof(bits));
+    return bits;
+}
 
 alignas(64) constexpr uint32_t bit_of_lane[lanes] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
                                                     1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};

@@ -77,10 +77,8 @@ RILL_INLINE uint32_t gather(const Field& f, const float lower[3], const float up
 
 /// About 1 / √x³, to half a percent, the same on every machine: a guess from the exponent and one Newton step.
 RILL_INLINE float inverse_cube_root_squared(float x) {
-    uint32_t bits;
+    const uint32_t bits = 0x5f375a86u - (bits_of(x) >> 1);
     float y;
-    std::memcpy(&bits, &x, sizeof(bits));
-    bits = 0x5f375a86u - (bits >> 1);
     std::memcpy(&y, &bits, sizeof(y));
     y = y * (1.5f - 0.5f * x * y * y);
     return y * y * y;
