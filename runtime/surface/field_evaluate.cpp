@@ -16,41 +16,6 @@ struct Results {
     float *value, *gx, *gy, *gz, *vx, *vy, *vz;
 };
 
-/// Which of the candidates reach a batch. Their rows are laid side by side once and asked for every batch.
-class Shortlist {
-public:
-    Shortlist(const Field& f, const uint32_t* candidates, uint32_t count) : f_(f), candidates_(candidates), count_(count) {
-        if (count_ <= most_laid_out) lay_out(0);
-    }
-    /// Up to most_listed of them, ascending; returns how many there are.
-    uint32_t list(const Batch& batch, uint32_t* out) {
-        const float* rows[7];
-        for (int k = 0; k < 7; ++k) rows[k] = row_[k];
-        uint32_t found = 0;
-        for (uint32_t first = 0; first < count_; first += most_laid_out) {
-            if (count_ > most_laid_out) lay_out(first);
-            found = f_.kernels->shortlist(rows, candidates_ + first, std::min(most_laid_out, count_ - first), batch, out, found);
-        }
-        return found;
-    }
-
-private:
-    void lay_out(uint32_t first) {
-        const uint32_t n = std::min(most_laid_out, count_ - first);
-        for (uint32_t c = 0; c < n; ++c) {
-            const Patch& p = f_.patches[candidates_[first + c]];
-            const float value[7] = {p.x, p.y, p.z, p.nx, p.ny, p.nz, p.inverse};
-            for (int k = 0; k < 7; ++k) row_[k][c] = value[k];
-        }
-        for (uint32_t c = n; c < (n + lanes - 1) / lanes * lanes; ++c)
-            for (int k = 0; k < 7; ++k) row_[k][c] = 0;
-    }
-    const Field& f_;
-    const uint32_t* candidates_;
-    uint32_t count_;
-    alignas(64) float row_[7][most_laid_out];
-};
-
 /// Where the blend alone does not decide: asks the winding number, and overrules where that is sure.
 void settle(const Field& f, const Batch& b, uint32_t l, uint32_t i, const Results& out) {
     float distance2;
@@ -110,32 +75,31 @@ void load(float* to, const float* from, uint32_t n) {
 
 struct Evaluation {
     const Field& f;
-    const Results& out;
-    Shortlist& shortlist;
+    const uint32_t* candidates;
+    uint32_t candidate_count;
     float trusted_value;  ///< up to this, values are not doubted
+    const Results& out;
     Batch batch;
     uint32_t list[most_listed];
 
-    Evaluation(const Field& field, const Results& results, Shortlist& of, float trusted)
-        : f(field), out(results), shortlist(of), trusted_value(trusted) {}
+    Evaluation(const Field& field, const uint32_t* all, uint32_t count, float trusted, const Results& results)
+        : f(field), candidates(all), candidate_count(count), trusted_value(trusted), out(results) {}
 
     /// n ≤ lanes positions; results go to index `first` on.
     void run(const float* x, const float* y, const float* z, uint32_t n, uint32_t first) {
         load(batch.x, x, n), load(batch.y, y, n), load(batch.z, z, n);
-        uint32_t count = shortlist.list(batch, list);
-        if (count > most_listed && n > 1) {
+        uint32_t listed = 0, doubts = ~0u;
+        if (candidate_count)
+            doubts = f.kernels->blend(f, candidates, candidate_count, list, listed, trusted_value, batch);
+        else
+            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0;
+        if (listed > most_listed && n > 1) {
             // A crowd: one by one, so that what each leaves out depends on itself alone.
             for (uint32_t l = 0; l < n; ++l) run(x + l, y + l, z + l, 1, first + l);
             return;
         }
-        count = std::min(count, most_listed);
-        uint32_t doubts = ~0u;
-        if (count)
-            doubts = f.kernels->blend(f, list, count, trusted_value, batch);
-        else
-            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0;
         std::copy(batch.value, batch.value + n, out.value + first);
-        if (out.gx) write_slopes(count, n, first);
+        if (out.gx) write_slopes(std::min(listed, most_listed), n, first);
         if (f.point_count) for_bits(doubts & ((1u << n) - 1), [&](uint32_t l) { settle(f, batch, l, first + l, out); });
     }
     void write_slopes(uint32_t count, uint32_t n, uint32_t first) {
@@ -150,12 +114,9 @@ struct Evaluation {
 void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, const float* x, const float* y,
                   const float* z, uint32_t n, float trusted_value, const Results& out) {
     const uint32_t points = uint32_t(std::lower_bound(candidates, candidates + count, f.point_count) - candidates);
-    {
-        Shortlist shortlist(f, candidates, points);
-        Evaluation evaluation(f, out, shortlist, trusted_value);
-        for (uint32_t first = 0; first < n; first += lanes)
-            evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
-    }
+    Evaluation evaluation(f, candidates, points, trusted_value, out);
+    for (uint32_t first = 0; first < n; first += lanes)
+        evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
     add_drops(f, candidates + points, count - points, x, y, z, n, out);
 }
 

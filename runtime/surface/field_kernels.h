@@ -8,7 +8,6 @@ namespace rill::surface {
 
 struct Field;
 inline constexpr uint32_t lanes = 16;
-inline constexpr uint32_t most_laid_out = 128;    // candidates
 inline constexpr uint32_t most_listed = 1024;     // patches that a batch may blend
 inline constexpr uint32_t most_neighbours = 14;   // rows of a fit
 inline constexpr uint32_t support_neighbour = 6;  // whose distance gives the support
@@ -38,16 +37,12 @@ struct alignas(64) Nearest {
 
 struct Kernels {
     const char* name;
+    bool fused;  ///< multiplies and adds with one rounding
     /// Points of the field whose weight can be non-zero somewhere in the box, as surface::gather().
     uint32_t (*gather)(const Field&, const float lower[3], const float upper[3], uint32_t* out, uint32_t capacity);
-    /// Appends to a list of `found` those of n ≤ most_laid_out candidates that may have weight in the box of the batch,
-    /// most_listed at most; rows x y z, nx ny nz, 1/R², read up to the next multiple of `lanes`. Returns how many there
-    /// are then.
-    uint32_t (*shortlist)(const float* const row[7], const uint32_t* candidates, uint32_t n, const Batch&, uint32_t* list,
-                          uint32_t found);
-    /// Fills all but the places in, and strikes from the list who has no weight. Returns bits of the lanes to ask the winding
-    /// number for: none up to |value| `trusted`.
-    uint32_t (*blend)(const Field&, uint32_t* list, uint32_t& count, float trusted, Batch&);
+    /// Fills all but the places in, and lists who of the candidates has weight, `most_listed` at most; `listed`: how many
+    /// there are. Returns bits of the lanes to ask the winding number for: none up to |value| `trusted`.
+    uint32_t (*blend)(const Field&, const uint32_t* candidates, uint32_t count, uint32_t* list, uint32_t& listed, float trusted, Batch&);
     void (*slope)(const Field&, const uint32_t* list, uint32_t count, const Batch&, bool velocity, Slopes&);
     /// Winding number of all points at a position, and about the squared distance to the nearest.
     float (*winding)(const Field&, float x, float y, float z, float& distance2);
@@ -57,8 +52,9 @@ struct Kernels {
     void (*fit)(Field&, uint32_t first, uint32_t last, const Nearest&);
 };
 
-/// Slowest first; with GCC the first is compiled without vectors, for reference. All give the same bits.
-constexpr uint32_t most_kernel_levels = 4;
+/// Slowest first; with GCC the first two are compiled without vectors, for reference. All that are `fused` give the same
+/// bits, and all that are not: only machines without fused instructions (x86-64 of before 2013) take one of these.
+constexpr uint32_t most_kernel_levels = 5;
 uint32_t kernel_levels(const Kernels* out[most_kernel_levels]) noexcept;
 const Kernels& best_kernels() noexcept;
 

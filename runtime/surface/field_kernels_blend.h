@@ -11,17 +11,22 @@
 namespace rill::surface::inner {
 
 /// 1: a patch that faces the same way as the nearest; 0: opposed to it.
-RILL_INLINE float gate_of(float agree) { return lesser(greater((agree - opposed) * gate_scale, 0), 1); }
+template <bool fused>
+RILL_INLINE float gate_of(float agree) {
+    return lesser(greater(madd<fused>(agree, gate_scale, -opposed * gate_scale), 0), 1);
+}
 
 /// (1 − u²)³ / u²: needs no root, and on real liquids its normals are 2 % nearer to the source's than (1 − u)² / u².
+template <bool fused>
 RILL_INLINE float weight_of(float u2, float activity) {
     const float c = greater(1 - u2, 0);
-    return activity * (c * c * c) / (u2 + soften);
+    return activity * (c * c * c) * inverse_of<fused>(u2 + soften);
 }
 /// Half its derivative by u².
+template <bool fused>
 RILL_INLINE float weight_slope_of(float u2, float activity) {
-    const float c = greater(1 - u2, 0), s = 1 / (u2 + soften);
-    return -0.5f * activity * (c * c) * s * (3 + c * s);
+    const float c = greater(1 - u2, 0), s = inverse_of<fused>(u2 + soften);
+    return -0.5f * activity * (c * c) * s * madd<fused>(c, s, 3);
 }
 RILL_INLINE float weight_b_of(float u2, float w, float agree) {
     const float apart = agree < opposed ? w : 0.f;
@@ -34,16 +39,20 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
 
 /// Squared distance and place in a block of a list in one word: the least word is that of the nearest, and the first of
 /// equals. What the place takes away is less than 1e-5 of the distance. (In three words: frames 5 to 8 % slower.)
-constexpr uint32_t block = 32, place_bits = block - 1, no_word = ~0u;
+// Signed, for most machines compare no other words.
+constexpr int32_t block = 32, place_bits = block - 1, no_word = 0x7fffffff, distance_bits = no_word & ~place_bits;
 
 /// What a block of patches is to each position: bits of those that have weight there, the word of the nearest among them,
 /// and the least u² of any.
 struct alignas(64) Reached {
-    uint32_t bits[lanes], nearest[lanes];
+    uint32_t bits[lanes];
+    int32_t nearest[lanes];
     float u2[lanes];
 };
+template <bool fused>
 RILL_INLINE void find_reached(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, Reached& out) {
-    alignas(64) uint32_t bits[lanes], nearest[lanes];
+    alignas(64) uint32_t bits[lanes];
+    alignas(64) int32_t nearest[lanes];
     alignas(64) float least[lanes];
     for (uint32_t l = 0; l < lanes; ++l) bits[l] = 0, nearest[l] = no_word, least[l] = unsupported;
     for (uint32_t c = 0; c < count; ++c) {
@@ -51,46 +60,47 @@ RILL_INLINE void find_reached(const Field& f, const uint32_t* list, uint32_t cou
         const uint32_t bit = 1u << c;
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
-            const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
-            const float u2 = (d2 + flatten * h * h) * p.inverse;
-            const uint32_t missed = u2 < 1 ? 0u : ~0u, word = (bits_of(d2 * p.recede) & ~place_bits) | c | missed;
-            bits[l] |= bit & ~missed, nearest[l] = word < nearest[l] ? word : nearest[l], least[l] = lesser(u2, least[l]);
+            const float h = dot<fused>(p.nx, p.ny, p.nz, rx, ry, rz), d2 = dot<fused>(rx, ry, rz, rx, ry, rz);
+            const float u2 = madd<fused>(flatten * h, h, d2) * p.inverse;
+            const int32_t missed = u2 < 1 ? 0 : -1, here = (int32_t(bits_of(d2 * p.recede)) & distance_bits) | int32_t(c), word = (here | missed) & no_word;
+            bits[l] |= bit & ~uint32_t(missed), nearest[l] = word < nearest[l] ? word : nearest[l], least[l] = lesser(u2, least[l]);
         }
     }
     for (uint32_t l = 0; l < lanes; ++l) out.bits[l] = bits[l], out.nearest[l] = nearest[l], out.u2[l] = least[l];
 }
 
-/// The nearest point among those with weight: its normal, the height above its plane and its 1/R². Keeps in the list who
-/// has weight anywhere, a good half of it; returns how many.
-RILL_INLINE uint32_t find_nearest(const Field& f, uint32_t* list, uint32_t count, Batch& b, float* height, float* inverse) {
+/// The nearest point among those with weight: its normal, the height above its plane and its 1/R². Lists who has weight
+/// anywhere, at most `most_listed`; returns how many there are.
+template <bool fused>
+RILL_INLINE uint32_t find_nearest(const Field& f, const uint32_t* candidates, uint32_t count, uint32_t* list, Batch& b,
+                                  float* height, float* inverse) {
     Reached reached;
-    alignas(64) uint32_t nearest[lanes], found[lanes];
+    alignas(64) int32_t nearest[lanes], found[lanes];
     alignas(64) float least[lanes];
-    uint32_t used[most_listed / block];
     for (uint32_t l = 0; l < lanes; ++l) nearest[l] = no_word, found[l] = 0, least[l] = unsupported;
-    for (uint32_t first = 0; first < count; first += block) {
-        find_reached(f, list + first, count - first < block ? count - first : block, b, reached);
+    uint32_t listed = 0;
+    for (uint32_t first = 0; first < count; first += uint32_t(block)) {
+        find_reached<fused>(f, candidates + first, count - first < uint32_t(block) ? count - first : uint32_t(block), b, reached);
         for (uint32_t l = 0; l < lanes; ++l) {
-            const uint32_t place = first + (reached.nearest[l] & place_bits), word = reached.nearest[l] | place_bits;
-            found[l] = word < nearest[l] ? place : found[l];
-            nearest[l] = word < nearest[l] ? word : nearest[l];
+            const int32_t word = reached.nearest[l] | place_bits, place = int32_t(first) + (reached.nearest[l] & place_bits);
+            const int32_t nearer = word < nearest[l] ? -1 : 0;
+            found[l] = (place & nearer) | (found[l] & ~nearer), nearest[l] = (word & nearer) | (nearest[l] & ~nearer);
             least[l] = lesser(reached.u2[l], least[l]);
         }
-        used[first / block] = word_of(reached.bits);
+        for (uint32_t some = word_of(reached.bits); some; some &= some - 1, ++listed)
+            if (listed < most_listed) list[listed] = candidates[first + lowest_bit(some)];
     }
     for (uint32_t l = 0; l < lanes; ++l) {
-        const Patch& p = f.patches[list[found[l]]];
+        const Patch& p = f.patches[candidates[found[l]]];
         b.u2[l] = least[l], b.nx[l] = p.nx, b.ny[l] = p.ny, b.nz[l] = p.nz;
-        height[l] = p.nx * (b.x[l] - p.x) + p.ny * (b.y[l] - p.y) + p.nz * (b.z[l] - p.z), inverse[l] = p.inverse;
+        height[l] = dot<fused>(p.nx, p.ny, p.nz, b.x[l] - p.x, b.y[l] - p.y, b.z[l] - p.z), inverse[l] = p.inverse;
     }
-    uint32_t kept = 0;
-    for (uint32_t first = 0; first < count; first += block)
-        for (uint32_t some = used[first / block]; some; some &= some - 1) list[kept++] = list[first + lowest_bit(some)];
-    return kept;
+    return listed;
 }
 
 /// Which side of A the points of B lie on, where both clusters have weight: below, the liquid between them is thin, above,
 /// the air is. Seldom asked: summed with the rest it would cost a tenth of the blend.
+template <bool fused>
 RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const float* height,
                            float* out) {
     alignas(64) float side[lanes] = {};
@@ -98,11 +108,11 @@ RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count,
         const Patch p = f.patches[list[c]];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
-            const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
-            const float u2 = (d2 + flatten * h * h) * p.inverse;
-            const float agree = p.nx * b.nx[l] + p.ny * b.ny[l] + p.nz * b.nz[l];
-            const float along = b.nx[l] * rx + b.ny[l] * ry + b.nz[l] * rz;
-            side[l] += weight_b_of(u2, weight_of(u2, p.activity), agree) * (height[l] - along);
+            const float h = dot<fused>(p.nx, p.ny, p.nz, rx, ry, rz), d2 = dot<fused>(rx, ry, rz, rx, ry, rz);
+            const float u2 = madd<fused>(flatten * h, h, d2) * p.inverse;
+            const float agree = dot<fused>(p.nx, p.ny, p.nz, b.nx[l], b.ny[l], b.nz[l]);
+            const float along = dot<fused>(b.nx[l], b.ny[l], b.nz[l], rx, ry, rz);
+            side[l] = madd<fused>(weight_b_of(u2, weight_of<fused>(u2, p.activity), agree), height[l] - along, side[l]);
         }
     }
     for (uint32_t l = 0; l < lanes; ++l) out[l] = side[l];
@@ -114,6 +124,7 @@ struct Opinions {
     const float *all, *sum, *square, *inside, *voters, *inverse;
 };
 /// Bits of the lanes to ask the winding number for.
+template <bool fused>
 RILL_INLINE uint32_t find_doubts(const Opinions& of, float trusted_value, Batch& b) {
     alignas(64) float against[lanes], most[lanes];
     for (uint32_t l = 0; l < lanes; ++l) against[l] = b.value[l] < 0 ? of.all[l] - of.inside[l] : of.inside[l];
@@ -121,7 +132,7 @@ RILL_INLINE uint32_t find_doubts(const Opinions& of, float trusted_value, Batch&
     alignas(64) uint32_t doubt[lanes];
     for (uint32_t l = 0; l < lanes; ++l) {
         const float size = b.value[l] < 0 ? -b.value[l] : b.value[l], u2 = b.u2[l], all = of.all[l], sum = of.sum[l];
-        const float variance = (of.square[l] * all - sum * sum) * of.inverse[l];  // all² times, in R²
+        const float variance = madd<fused>(of.square[l], all, -sum * sum) * of.inverse[l];  // all² times, in R²
         const float split = against[l] * variance > most[l] * (all * all * all) ? u2 : 0.f;
         const float unsure = of.voters[l] < enough_voters ? u2 : split, asked = size > trusted_value ? unsure : 0.f;
         const float doubted = b.sign[l] == 0 ? unsupported : asked;
@@ -130,43 +141,65 @@ RILL_INLINE uint32_t find_doubts(const Opinions& of, float trusted_value, Batch&
     return word_of(doubt);
 }
 
-RILL_INLINE uint32_t blend(const Field& f, uint32_t* list, uint32_t& count, float trusted_value, Batch& b) {
-    alignas(64) float height[lanes], inverse[lanes], side[lanes] = {};
-    alignas(64) float weight_a[lanes] = {}, sum_a[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {};
-    alignas(64) float all[lanes] = {}, sum[lanes] = {}, square[lanes] = {}, inside[lanes] = {}, voters[lanes] = {};
-    count = find_nearest(f, list, count, b, height, inverse);
+/// What the patches of a batch come to: of cluster A and B weight and weighted value, of A how many patches, and the
+/// moments of find_doubts().
+struct alignas(64) Sums {
+    float weight_a[lanes], sum_a[lanes], voters[lanes], weight_b[lanes], sum_b[lanes];
+    float all[lanes], sum[lanes], square[lanes], inside[lanes];
+};
+template <bool fused>
+RILL_INLINE void sum_up(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, Sums& out) {
+    alignas(64) float weight_a[lanes] = {}, sum_a[lanes] = {}, voters[lanes] = {}, weight_b[lanes] = {}, sum_b[lanes] = {};
+    alignas(64) float all[lanes] = {}, sum[lanes] = {}, square[lanes] = {}, inside[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
-            const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
-            const float u2 = (d2 + flatten * h * h) * p.inverse, w = weight_of(u2, p.activity);
-            const float g = h + rx * (p.xx * rx + p.xy * ry + p.xz * rz) + ry * (p.yy * ry + p.yz * rz) + p.zz * rz * rz;
-            const float agree = p.nx * b.nx[l] + p.ny * b.ny[l] + p.nz * b.nz[l], gate = gate_of(agree);
+            const float h = dot<fused>(p.nx, p.ny, p.nz, rx, ry, rz), d2 = dot<fused>(rx, ry, rz, rx, ry, rz);
+            const float u2 = madd<fused>(flatten * h, h, d2) * p.inverse, w = weight_of<fused>(u2, p.activity);
+            const float bent = madd<fused>(ry, madd<fused>(p.yy, ry, p.yz * rz), madd<fused>(p.zz * rz, rz, h));
+            const float g = madd<fused>(rx, dot<fused>(p.xx, p.xy, p.xz, rx, ry, rz), bent);
+            const float agree = dot<fused>(p.nx, p.ny, p.nz, b.nx[l], b.ny[l], b.nz[l]), gate = gate_of<fused>(agree);
             const float wa = w * (gate * gate), wb = weight_b_of(u2, w, agree), wg = w * g;
-            weight_a[l] += wa, sum_a[l] += wa * g, voters[l] += wa > 0 ? 1.f : 0.f;
-            weight_b[l] += wb, sum_b[l] += wb * g;
-            all[l] += w, sum[l] += wg, square[l] += wg * g, inside[l] += g < 0 ? w : 0.f;
+            weight_a[l] += wa, sum_a[l] = madd<fused>(wa, g, sum_a[l]), voters[l] += wa > 0 ? 1.f : 0.f;
+            weight_b[l] += wb, sum_b[l] = madd<fused>(wb, g, sum_b[l]);
+            all[l] += w, sum[l] += wg, square[l] = madd<fused>(wg, g, square[l]), inside[l] += g < 0 ? w : 0.f;
         }
     }
-    if (greatest_of(weight_b) > 0) find_side(f, list, count, b, height, side);
+    const float* const sums[9] = {weight_a, sum_a, voters, weight_b, sum_b, all, sum, square, inside};
+    float* const to[9] = {out.weight_a, out.sum_a, out.voters, out.weight_b, out.sum_b, out.all, out.sum, out.square, out.inside};
+    for (int k = 0; k < 9; ++k)
+        for (uint32_t l = 0; l < lanes; ++l) to[k][l] = sums[k][l];
+}
+
+template <bool fused>
+RILL_INLINE uint32_t blend(const Field& f, const uint32_t* candidates, uint32_t candidate_count, uint32_t* list, uint32_t& listed,
+                           float trusted_value, Batch& b) {
+    alignas(64) float height[lanes], inverse[lanes], side[lanes] = {};
+    Sums sums;
+    listed = find_nearest<fused>(f, candidates, candidate_count, list, b, height, inverse);
+    const uint32_t count = listed < most_listed ? listed : most_listed;
+    sum_up<fused>(f, list, count, b, sums);
+    if (greatest_of(sums.weight_b) > 0) find_side<fused>(f, list, count, b, height, side);
     constexpr float least_weight = 1e-30f;
     // A condition asked twice in a loop would become a branch.
     alignas(64) float value_a[lanes], value_b[lanes], take[lanes];  // take > 0: cluster B
     for (uint32_t l = 0; l < lanes; ++l) {
-        const float mean_a = sum_a[l] / greater(weight_a[l], least_weight), mean_b = sum_b[l] / greater(weight_b[l], least_weight);
-        const float a = weight_a[l] > 0 ? mean_a : unsupported;
+        const float of_a = sums.weight_a[l], of_b = sums.weight_b[l];
+        const float mean_a = sums.sum_a[l] / greater(of_a, least_weight), mean_b = sums.sum_b[l] / greater(of_b, least_weight);
+        const float a = of_a > 0 ? mean_a : unsupported;
         // Thin liquid: intersection, max; thin air: union, min.
         const float gain = side[l] < 0 ? mean_b - a : a - mean_b;
-        value_a[l] = a, value_b[l] = mean_b, take[l] = weight_b[l] > 0 ? gain : 0.f;
+        value_a[l] = a, value_b[l] = mean_b, take[l] = of_b > 0 ? gain : 0.f;
     }
     for (uint32_t l = 0; l < lanes; ++l) b.value[l] = take[l] > 0 ? value_b[l] : value_a[l];
-    for (uint32_t l = 0; l < lanes; ++l) b.weight[l] = take[l] > 0 ? weight_b[l] : weight_a[l];
-    for (uint32_t l = 0; l < lanes; ++l) b.sign[l] = take[l] > 0 ? -1.f : weight_a[l] > 0 ? 1.f : 0.f;
-    return find_doubts({all, sum, square, inside, voters, inverse}, trusted_value, b);
+    for (uint32_t l = 0; l < lanes; ++l) b.weight[l] = take[l] > 0 ? sums.weight_b[l] : sums.weight_a[l];
+    for (uint32_t l = 0; l < lanes; ++l) b.sign[l] = take[l] > 0 ? -1.f : sums.weight_a[l] > 0 ? 1.f : 0.f;
+    return find_doubts<fused>({sums.all, sums.sum, sums.square, sums.inside, sums.voters, inverse}, trusted_value, b);
 }
 
 /// Of the chosen cluster: Σ w ∇G + ripple (G − value) ∇w, and Σ w v.
+template <bool fused>
 RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, bool velocity, Slopes& out) {
     alignas(64) float gx[lanes] = {}, gy[lanes] = {}, gz[lanes] = {}, vx[lanes] = {}, vy[lanes] = {}, vz[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
@@ -176,18 +209,18 @@ RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, con
         const float xx = 2 * p.xx, yy = 2 * p.yy, zz = 2 * p.zz, steep = 4 * ripple * p.inverse;
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
-            const float h = p.nx * rx + p.ny * ry + p.nz * rz, d2 = rx * rx + ry * ry + rz * rz;
-            const float lean = flatten * h, u2 = (d2 + lean * h) * p.inverse;
-            const float agree = p.nx * b.nx[l] + p.ny * b.ny[l] + p.nz * b.nz[l], gate = gate_of(agree);
+            const float h = dot<fused>(p.nx, p.ny, p.nz, rx, ry, rz), d2 = dot<fused>(rx, ry, rz, rx, ry, rz);
+            const float lean = flatten * h, u2 = madd<fused>(lean, h, d2) * p.inverse;
+            const float agree = dot<fused>(p.nx, p.ny, p.nz, b.nx[l], b.ny[l], b.nz[l]), gate = gate_of<fused>(agree);
             const float keep = b.sign[l] < 0 ? weight_b_of(u2, 1, agree) : gate * gate;
-            const float w = keep * weight_of(u2, p.activity), slope = keep * weight_slope_of(u2, p.activity) * steep;
-            const float hx = xx * rx + p.xy * ry + p.xz * rz, hy = p.xy * rx + yy * ry + p.yz * rz,
-                        hz = p.xz * rx + p.yz * ry + zz * rz;
-            const float k = slope * (h + 0.5f * (rx * hx + ry * hy + rz * hz) - b.value[l]);
-            gx[l] += w * (p.nx + hx) + k * (rx + lean * p.nx);
-            gy[l] += w * (p.ny + hy) + k * (ry + lean * p.ny);
-            gz[l] += w * (p.nz + hz) + k * (rz + lean * p.nz);
-            vx[l] += w * mx, vy[l] += w * my, vz[l] += w * mz;
+            const float w = keep * weight_of<fused>(u2, p.activity), slope = keep * weight_slope_of<fused>(u2, p.activity) * steep;
+            const float hx = dot<fused>(xx, p.xy, p.xz, rx, ry, rz), hy = dot<fused>(p.xy, yy, p.yz, rx, ry, rz),
+                        hz = dot<fused>(p.xz, p.yz, zz, rx, ry, rz);
+            const float k = slope * madd<fused>(0.5f, dot<fused>(rx, ry, rz, hx, hy, hz), h - b.value[l]);
+            gx[l] = madd<fused>(w, p.nx + hx, madd<fused>(k, madd<fused>(lean, p.nx, rx), gx[l]));
+            gy[l] = madd<fused>(w, p.ny + hy, madd<fused>(k, madd<fused>(lean, p.ny, ry), gy[l]));
+            gz[l] = madd<fused>(w, p.nz + hz, madd<fused>(k, madd<fused>(lean, p.nz, rz), gz[l]));
+            vx[l] = madd<fused>(w, mx, vx[l]), vy[l] = madd<fused>(w, my, vy[l]), vz[l] = madd<fused>(w, mz, vz[l]);
         }
     }
     for (uint32_t l = 0; l < lanes; ++l) {

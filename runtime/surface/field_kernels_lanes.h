@@ -20,10 +20,38 @@ namespace rill::surface::inner {
 RILL_INLINE float lesser(float a, float b) { return a < b ? a : b; }
 RILL_INLINE float greater(float a, float b) { return a > b ? a : b; }
 
+/// a b + c, rounded once where the instruction set can (`fused`), else twice; never left to what a compiler makes of it.
+template <bool fused>
+RILL_INLINE float madd(float a, float b, float c) {
+#if defined(__GNUC__)
+    if constexpr (fused) return __builtin_fmaf(a, b, c);
+#endif
+    return a * b + c;
+}
+template <bool fused>
+RILL_INLINE float dot(float ax, float ay, float az, float bx, float by, float bz) {
+    return madd<fused>(ax, bx, madd<fused>(ay, by, az * bz));
+}
+
 RILL_INLINE uint32_t bits_of(float x) {
     uint32_t bits;
     std::memcpy(&bits, &x, sizeof(bits));
     return bits;
+}
+
+RILL_INLINE float float_of(int32_t bits) {
+    float x;
+    std::memcpy(&x, &bits, sizeof(x));
+    return x;
+}
+
+/// About 1 / x of a positive x, to 7e-6: a guess from the exponent and two Newton steps. A division takes as long as all
+/// the rest of a weight.
+template <bool fused>
+RILL_INLINE float inverse_of(float x) {
+    float y = float_of(0x7ef311c7 - int32_t(bits_of(x)));
+    y *= madd<fused>(-x, y, 2);
+    return y * madd<fused>(-x, y, 2);
 }
 
 alignas(64) constexpr uint32_t bit_of_lane[lanes] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
