@@ -9,6 +9,7 @@
 #include <new>
 
 #include "mesher.h"
+#include "surface/field_kernels.h"
 
 namespace rill {
 namespace {
@@ -64,6 +65,7 @@ Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept {
     carve(memory, m->limits, *m);
     m->hash_mask = hash_slots(m->limits.tiles) - 1;
     m->access = {surface::gather, surface::evaluate, surface::evaluate_at_surface};
+    m->draw = surface::best_kernels().draw;
     return m;
 }
 

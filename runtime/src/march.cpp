@@ -118,60 +118,28 @@ void seed_drop(Mesher& m, uint32_t i) {
     }
 }
 
-/// Rounded down into 0 … most; no number at all is `most`: patches of a hostile asset reach anywhere.
-int within(float x, int most) { return int(std::max(0.f, std::min(float(most), x))); }
-
-/// Marks the cells of the tile that the disc of point i crosses, column by column along the axis its normal
-/// is nearest to. A guess is enough: the march finds what is missed. (Without a branch, three cells to a column, it takes
-/// half as many instructions again.)
-void draw_disc(const Mesher& m, Tile& tile, uint32_t i) {
-    const surface::Field& f = *m.input.field;
-    const surface::Patch& q = f.patches[i];
-    const float cells = 1 / tile.cell, radius = disc_share * f.support[i] * cells + 0.5f;
-    const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
-    float at[3];  // in cells of this tile
-    for (int a = 0; a < 3; ++a) {
-        at[a] = p[a] * cells - float(tile_cells * tile.coord[a]);
-        if (!(at[a] > -radius && at[a] < tile_cells + radius)) return;
-    }
-    int from[3], to[3], home[3];
-    bool is_home = true;
-    for (int a = 0; a < 3; ++a) {
-        from[a] = within(at[a] - radius, tile_cells);
-        to[a] = within(at[a] + radius, tile_cells - 1);
-        is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
-        home[a] = within(at[a], tile_cells - 1);
-    }
-    if (is_home) want(tile, home);
-    const int axis = std::abs(n[0]) > std::abs(n[1]) ? (std::abs(n[0]) > std::abs(n[2]) ? 0 : 2)
-                                                     : (std::abs(n[1]) > std::abs(n[2]) ? 1 : 2);
-    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    // In the plane r = r_u (e_u + slope_u e_axis) + r_v (e_v + slope_v e_axis); its square, and the quadratic above it.
-    const float slope_u = -n[u] / n[axis], slope_v = -n[v] / n[axis], bend = -tile.cell / n[axis];
-    const float own[3] = {q.xx, q.yy, q.zz}, mixed[3] = {q.yz, q.xz, q.xy};  // mixed: of the other two axes
-    const float uu = bend * (own[u] + slope_u * (mixed[v] + slope_u * own[axis]));
-    const float vv = bend * (own[v] + slope_v * (mixed[u] + slope_v * own[axis]));
-    const float uv = bend * (mixed[axis] + slope_u * mixed[u] + slope_v * mixed[v] + 2 * slope_u * slope_v * own[axis]);
-    const float half = 0.5f * (std::abs(slope_u) + std::abs(slope_v));
-    int cell[3];
-    for (cell[v] = from[v]; cell[v] <= to[v]; ++cell[v]) {
-        const float rv = float(cell[v]) + 0.5f - at[v];
-        const float nearest = radius * radius - (1 + slope_v * slope_v) * rv * rv, skew = 2 * slope_u * slope_v * rv;
-        const float slope = slope_u + uv * rv, height = at[axis] + (slope_v + vv * rv) * rv;
-        for (cell[u] = from[u]; cell[u] <= to[u]; ++cell[u]) {
-            const float ru = float(cell[u]) + 0.5f - at[u];
-            if (((1 + slope_u * slope_u) * ru + skew) * ru > nearest) continue;
-            const float middle = height + (slope + uu * ru) * ru;
-            const int last = within(middle + half + 1, tile_cells) - 1;
-            cell[axis] = within(middle - half, tile_cells);
-            for (; cell[axis] <= last; ++cell[axis]) want(tile, cell);
-        }
-    }
-}
-
+/// Marks the cells of the tile that the discs of its points cross. A guess is enough: the march finds what is missed.
 void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
-    for (uint32_t c = 0; c < std::min(s.candidate_count, s.most_candidates); ++c)
-        if (s.candidates[c] < m.input.field->point_count) draw_disc(m, tile, s.candidates[c]);
+    const surface::Field& f = *m.input.field;
+    const float cells = 1 / tile.cell;
+    uint8_t rows[rows_per_tile] = {};
+    for (uint32_t c = 0; c < std::min(s.candidate_count, s.most_candidates); ++c) {
+        const uint32_t i = s.candidates[c];
+        if (i >= f.point_count) break;  // drops come last
+        const float place[3] = {f.x[i], f.y[i], f.z[i]}, normal[3] = {f.nx[i], f.ny[i], f.nz[i]};
+        const float radius = disc_share * f.support[i] * cells + 0.5f;
+        float at[3];  // in cells of this tile
+        bool touches = true, is_home = true;
+        for (int a = 0; a < 3; ++a) {
+            at[a] = place[a] * cells - float(tile_cells * tile.coord[a]);
+            touches = touches && at[a] > -radius && at[a] < tile_cells + radius;
+            is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
+        }
+        if (!touches) continue;
+        m.draw(at, normal, radius, rows);
+        if (is_home) rows[int(at[1]) + 8 * int(at[2])] |= uint8_t(1 << int(at[0]));
+    }
+    for (uint32_t row = 0; row < rows_per_tile; ++row) tile.pending[row] |= uint8_t(rows[row] & ~tile.visited[row]);
 }
 
 /// Evaluates the corners of the pending cells that are not known yet.

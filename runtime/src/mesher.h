@@ -97,6 +97,7 @@ struct Mesher {
     MeshLimits limits;
     MeshInput input;
     FieldAccess access;
+    void (*draw)(const float centre[3], const float normal[3], float radius, uint8_t rows[rows_per_tile]);  ///< surface::Kernels'
     uint32_t cut;
     uint32_t vertices_wanted, indices_wanted, ranges_wanted;  ///< the most of all attempts
     uint32_t vertices_found;   ///< by this attempt
@@ -225,13 +226,17 @@ void halve_until_listed(const Mesher& m, MesherScratch& s, uint32_t first, uint3
     halve_until_listed(m, s, split, first + n - split, work);
 }
 
-/// The same for the first n positions of the scratch, all in the tile that was listed last.
+/// The same for the first n positions of the scratch, all in the tile that was listed last. Where that list is long, as it is
+/// with coarse cells, runs of positions, which lie together, have lists of their own. (96 and 48: cells twice and four times as
+/// large take 3 to 10 % less than with one list; 64 and 64 the same, 128 and 64 2 % more.)
 template <typename Work>
 void with_candidates(const Mesher& m, MesherScratch& s, uint32_t n, Work&& work) {
-    if (s.candidate_count > s.most_candidates)
-        halve_until_listed(m, s, 0, n, work);
-    else if (n)
-        work(s.candidates, s.candidate_count, 0, n);
+    constexpr uint32_t long_list = 96, run = 48;
+    if (s.candidate_count <= long_list) {
+        if (n) work(s.candidates, s.candidate_count, 0, n);
+        return;
+    }
+    for (uint32_t first = 0; first < n; first += run) halve_until_listed(m, s, first, n - first < run ? n - first : run, work);
 }
 
 }  // namespace rill

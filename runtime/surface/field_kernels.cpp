@@ -3,6 +3,7 @@
 #include "surface/field_kernels.h"
 
 #include "surface/field_kernels_blend.h"
+#include "surface/field_kernels_draw.h"
 #include "surface/field_kernels_fit.h"
 #include "surface/field_kernels_search.h"
 
@@ -31,7 +32,11 @@ namespace {
     target void fit_##id(Field& f, uint32_t first, uint32_t last, const Nearest& near) {                          \
         inner::fit(f, first, last, near);                                                                         \
     }                                                                                                             \
-    constexpr Kernels kernels_##id{#id, fused, gather_##id, blend_##id, slope_##id, winding_##id, nearest_##id, fit_##id};
+    target void draw_##id(const float centre[3], const float normal[3], float radius, uint8_t rows[8 * 8]) {      \
+        inner::draw_disc(centre, normal, radius, rows);                                                           \
+    }                                                                                                             \
+    constexpr Kernels kernels_##id{#id,          fused,        gather_##id, blend_##id, slope_##id,               \
+                                   winding_##id, nearest_##id, fit_##id,    draw_##id};
 
 #if defined(__GNUC__) && (defined(__FMA__) || defined(__ARM_FEATURE_FMA))
 constexpr bool baseline_fused = true;

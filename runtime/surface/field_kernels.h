@@ -50,6 +50,9 @@ struct Kernels {
     void (*nearest)(const Field&, uint32_t bundle, Nearest&);
     /// Supports and quadratics of points [first, last) of that bundle.
     void (*fit)(Field&, uint32_t first, uint32_t last, const Nearest&);
+    /// Adds to rows (y + 8 z; bit x) of 8³ cells those that a disc crosses, all in cells from the block's lowest corner. A
+    /// guess, of no consequence but for how much there is left to find.
+    void (*draw)(const float centre[3], const float normal[3], float radius, uint8_t rows[8 * 8]);
 };
 
 /// Slowest first; with GCC the first two are compiled without vectors, for reference. All that are `fused` give the same
