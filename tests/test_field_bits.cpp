@@ -87,6 +87,36 @@ TEST_CASE("every instruction set gives the bits of the scalar code that rounds a
     CHECK_FALSE(same_bits(reference[0], reference[1]));
 }
 
+TEST_CASE("discs: the cells whose middles lie in the ball and by the plane, whatever the instruction set") {
+    const surface::Kernels* levels[surface::most_kernel_levels];
+    const uint32_t count = surface::kernel_levels(levels);
+    Random random(14);
+    size_t marked = 0, wrong = 0;
+    for (int i = 0; i < 2000; ++i) {
+        Vec n = random.direction();
+        if (i % 7 == 0) n = Vec{double(i % 3 == 0), double(i % 3 == 1), double(i % 3 == 2)};
+        const float centre[3] = {float(14 * random() - 3), float(14 * random() - 3), float(14 * random() - 3)};
+        const float normal[3] = {float(n[0]), float(n[1]), float(n[2])}, radius = float(0.5 + 5 * random());
+        uint8_t rows[64] = {}, same[64];
+        levels[0]->draw(centre, normal, radius, rows);
+        for (uint32_t k = 1; k < count; ++k) {
+            CAPTURE(levels[k]->name);
+            std::memset(same, 0, sizeof(same));
+            levels[k]->draw(centre, normal, radius, same);
+            CHECK(std::memcmp(rows, same, sizeof(rows)) == 0);
+        }
+        const double reach = 0.5 * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2])), rounding = 1e-4;
+        for (int cell = 0; cell < 512; ++cell) {
+            const Vec r = Vec{cell % 8 + 0.5, cell / 8 % 8 + 0.5, cell / 64 + 0.5} - Vec{centre[0], centre[1], centre[2]};
+            const double beyond = std::max(std::sqrt(dot(r, r)) - radius, std::fabs(dot(n, r)) - reach);
+            const bool is_marked = rows[cell / 8] >> cell % 8 & 1;
+            marked += is_marked, wrong += std::fabs(beyond) > rounding && is_marked != (beyond < 0);
+        }
+    }
+    CHECK(marked > 10000);
+    CHECK(wrong == 0);
+}
+
 TEST_CASE("gather: tells how many there are, and never writes beyond its room") {
     Cloud cloud;
     add(cloud, sphere_of(1), 0.2);
