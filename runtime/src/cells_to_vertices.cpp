@@ -174,9 +174,30 @@ void write3(const Stream& stream, uint32_t index, const float v[3]) {
         std::memcpy(static_cast<uint8_t*>(stream.data) + size_t(index) * stream.stride, v, 3 * sizeof(float));
 }
 
-/// Moves a batch of n vertices onto the field, and gives them: take(slot, vertex).
-template <typename Take>
-void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, Take take) {
+/// Where vertices go: to the target, moved to their parents' if they morph; or they are those parents'.
+struct Output {
+    const Mesher& m;
+    Tile* drawn;  ///< null: vertices of parents
+    bool morphs;
+
+    void write(MesherScratch& s, uint32_t i, uint32_t cell, Vertex& v) const {
+        if (!drawn) {
+            s.parents.vertex[i] = v;
+            return;
+        }
+        if (morphs) move_to_parent(s, *drawn, cell, v);
+        const uint32_t vertex = drawn->first_vertex + i;
+        std::memcpy(m.position + 3 * size_t(vertex), v.position, sizeof(v.position));
+        cover(*drawn, v.position);
+        if (!m.input.target) return;
+        write3(m.input.target->position, vertex, v.position);
+        write3(m.input.target->normal, vertex, v.normal);
+        if (is_moving(m)) write3(m.input.target->velocity, vertex, v.velocity);
+    }
+};
+
+/// Moves a batch of n vertices onto the field and writes them, as vertices `begin` and on of the tile.
+void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, uint32_t begin, const Output& output) {
     float* velocity = is_moving(m) ? s.velocity : nullptr;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
         m.access.evaluate_at_surface(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
@@ -195,27 +216,24 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
             const float scale = 1 / std::sqrt(length2);
             for (float& c : normal) c *= scale;
             for (uint32_t a = 0; a < 3 && velocity; ++a) vertex.velocity[a] = velocity[i - first + a * batch];
-            take(slot, vertex);
+            output.write(s, begin + slot, s.cell[slot], vertex);
         }
     });
 }
 
-/// The vertices of all surface cells of a tile: take(vertex, cell), the vertex's number in the tile, the cell. The
-/// corner values are used up then; what the quads need takes their place.
-template <typename Take>
-void place_cells(const Mesher& m, MesherScratch& s, Tile& tile, Take take) {
+/// The vertices of all surface cells of a tile. The corner values are used up then; what the quads need takes their place.
+void place_cells(const Mesher& m, MesherScratch& s, Tile& tile, const Output& output) {
     uint32_t n = 0, done = 0;
-    const auto finish = [&] {
-        finish_batch(m, s, tile, n, [&](uint32_t slot, Vertex& v) { take(done + slot, s.cell[slot], v); });
-        done += n, n = 0;
-    };
     for_surface_cells(tile, [&](uint32_t cell) {
         const CellPattern pattern = pattern_at(m, tile, cell);
         s.pattern[cell] = pattern, s.vertex[cell] = uint16_t(done + n);
-        if (n + 4 > MesherScratch::capacity) finish();
+        if (n + 4 > MesherScratch::capacity) {
+            finish_batch(m, s, tile, n, done, output);
+            done += n, n = 0;
+        }
         place_patches(s, tile, cell, patches_of(pattern), n);
     });
-    finish();
+    finish_batch(m, s, tile, n, done, output);
     for_surface_cells(tile, [&](uint32_t cell) {
         tile.placed.vertex[cell] = s.vertex[cell], tile.placed.pattern[cell] = s.pattern[cell];
     });
@@ -225,17 +243,8 @@ void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
     for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
     list_candidates(m, s, tile);
     const bool morphs = find_parents(m, s, tile);
-    if (morphs) place_cells(m, s, s.parents.tile, [&](uint32_t i, uint32_t, const Vertex& v) { s.parents.vertex[i] = v; });
-    place_cells(m, s, tile, [&](uint32_t i, uint32_t cell, Vertex& v) {
-        if (morphs) move_to_parent(s, tile, cell, v);
-        const uint32_t vertex = tile.first_vertex + i;
-        std::memcpy(m.position + 3 * size_t(vertex), v.position, sizeof(v.position));
-        cover(tile, v.position);
-        if (!m.input.target) return;
-        write3(m.input.target->position, vertex, v.position);
-        write3(m.input.target->normal, vertex, v.normal);
-        if (is_moving(m)) write3(m.input.target->velocity, vertex, v.velocity);
-    });
+    if (morphs) place_cells(m, s, s.parents.tile, {m, nullptr, false});
+    place_cells(m, s, tile, {m, &tile, morphs});
 }
 
 }  // namespace
