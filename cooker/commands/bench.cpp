@@ -188,7 +188,12 @@ int bench_command(const BenchOptions& options) {
     for (const Pass& pass : details) frame_allocations += pass.frame_allocations, list.push_back(to_json(pass));
     nlohmann::json screen = nlohmann::json::array();
     for (const ScreenError& e : far)
-        screen.push_back({{"diagonals", e.diagonals}, {"triangles_share", e.triangles}, {"mean_pixels", e.mean}, {"p99_pixels", e.p99}, {"max_pixels", e.max}});
+        screen.push_back({{"diagonals", e.diagonals},
+                          {"triangles_share", e.triangles},
+                          {"mean_pixels", e.mean},
+                          {"p99_pixels", e.p99},
+                          {"max_pixels", e.max},
+                          {"total_us", e.microseconds}});
     const double rill_rate = passes[1].triangles_per_second(stage_processor), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
     const nlohmann::json json = {
         {"report", "rill bench"},
@@ -227,8 +232,8 @@ int bench_command(const BenchOptions& options) {
                     static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
                     readable_bytes(memory["peak_bytes"].get<double>()).c_str());
         for (const ScreenError& e : far)
-            std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
-                        double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.mean, e.p99, e.max);
+            std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles in %.1f ms, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
+                        double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.microseconds / 1000, e.mean, e.p99, e.max);
         std::printf("moving away from 1 to 8 diagonals: %u of %u moves change the surface, the worst by %.2f pixels on average, p99 %.2f, max %.1f; "
                     "%u move something of it by more than %g, the worst %.3f %%\n",
                     camera.changes, camera.moves, camera.mean, camera.p99, camera.max, camera.above_cell, double(pixel_error_asked), 100 * camera.share_above);

@@ -41,7 +41,7 @@ glm::vec3 eye_at(const AssetInfo& info, float diagonals) {
 
 std::vector<ScreenError> screen_errors(BenchPlayer& player, const std::vector<uint32_t>& frames) {
     Spread pixels[std::size(distances)];
-    double triangles[std::size(distances)] = {}, triangles_whole = 0;
+    double triangles[std::size(distances)] = {}, microseconds[std::size(distances)] = {}, triangles_whole = 0;
     const size_t count = std::min(most_frames, frames.size());
     for (size_t k = 0; k < count; ++k) {
         const double seconds = player.seconds_of(frames[frames.size() * k / count]);
@@ -53,7 +53,7 @@ std::vector<ScreenError> screen_errors(BenchPlayer& player, const std::vector<ui
             const glm::vec3 eye = eye_at(player.info(), distances[d]);
             Mesh mesh;
             player.look_from(eye, pixels_per_radian, pixel_error_asked);
-            player.play(seconds, 0, &mesh);
+            microseconds[d] += player.play(seconds, 0, &mesh).microseconds[stage_total];
             triangles[d] += double(mesh.triangles.size());
             add_both_ways(pixels[d], mesh, whole, eye);
         }
@@ -62,7 +62,7 @@ std::vector<ScreenError> screen_errors(BenchPlayer& player, const std::vector<ui
     std::vector<ScreenError> errors;
     for (size_t d = 0; d < std::size(distances); ++d)
         errors.push_back({distances[d], pixels[d].mean(), pixels[d].p99(), pixels[d].max,
-                          triangles_whole > 0 ? triangles[d] / triangles_whole : 0});
+                          triangles_whole > 0 ? triangles[d] / triangles_whole : 0, count ? microseconds[d] / double(count) : 0});
     return errors;
 }
 

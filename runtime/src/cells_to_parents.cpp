@@ -3,8 +3,8 @@
 // each in the place of 2³ of theirs, would have them (Levels::morph): by the time the octree takes those, nothing is left
 // to change. Parents' corners are every other one of the tile's, so that their patches follow from values which mostly are
 // there already. All vertices in one parent move alike and stay inside it: polygons between them collapse, those round the
-// parents' edges become the parents' own. What the parents do not see, small drops and thin sheets, shrinks to a point in
-// each of them.
+// parents' edges become the parents' own. What parents do not see, rims of thin sheets and small drops, draws back to what
+// they see; where there is nothing near, it shrinks to a point.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -22,21 +22,21 @@ uint32_t parent_cell(const Tile& tile, uint32_t cell) {
     return x + 8 * (y + 8 * (cell / 64 / 2 + offset(tile, 2)));
 }
 
-/// Marks the parents of surface cells that are on the move; false: none.
+bool has_surface(const Tile& tile, uint32_t cell) { return tile.surface[cell / 8] >> cell % 8 & 1; }
+
+/// Marks the parents of surface cells; false: none of them is on the move.
 bool mark_parents(const Levels& levels, const Tile& tile, ParentCells& parents) {
     Tile& to = parents.tile;
     bool any = false;
     for (uint32_t row = 0; row < rows_per_tile; ++row) {
         for_bits(tile.surface[row], [&](uint32_t x) {
             const uint32_t parent = parent_cell(tile, x + 8 * row), at[3] = {parent % 8, parent / 8 % 8, parent / 64};
-            if (to.visited[parent / 8] >> at[0] & 1) return;
-            to.visited[parent / 8] |= uint8_t(1 << at[0]);
+            if (has_surface(to, parent)) return;
+            to.surface[parent / 8] |= uint8_t(1 << at[0]);
             float middle[3];
             for (uint32_t a = 0; a < 3; ++a) middle[a] = corner_at(to, a, at[a]) + 0.5f * to.cell;
             parents.morph[parent] = levels.morph(tile.level, middle);
-            if (!(parents.morph[parent] > 0)) return;
-            to.surface[parent / 8] |= uint8_t(1 << at[0]);
-            any = true;
+            any = any || parents.morph[parent] > 0;
         });
     }
     return any;
@@ -75,6 +75,21 @@ void find_corners(const Mesher& m, MesherScratch& s, const Tile& tile) {
     s.corners_evaluated += n;
 }
 
+/// Whether the surface passes from a parent to the next along an axis.
+bool joined(const Tile& tile, uint32_t parent, uint32_t axis) {
+    uint32_t first[3] = {parent % 8, parent / 8 % 8, parent / 64}, last[3];
+    for (uint32_t a = 0; a < 3; ++a) first[a] = 2 * (first[a] - offset(tile, a)), last[a] = first[a] + 2;
+    first[axis] = last[axis];
+    const uint32_t face = (2u << last[0]) - (1u << first[0]);
+    uint32_t liquid = 0, air = 0;
+    for (uint32_t z = first[2]; z <= last[2]; ++z)
+        for (uint32_t y = first[1]; y <= last[1]; ++y) {
+            const uint32_t known = tile.known[y + 9 * z] & face, inside = tile.inside[y + 9 * z];
+            liquid |= known & inside, air |= known & ~inside;
+        }
+    return liquid && air;
+}
+
 float square(float x) { return x * x; }
 
 float agreement(const Vertex& a, const Vertex& b) {
@@ -108,10 +123,36 @@ bool find_parents(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept 
     return true;
 }
 
+void adopt_orphans(MesherScratch& s, const Tile& tile) noexcept {
+    Tile& to = s.parents.tile;
+    constexpr uint16_t orphan = cells_per_tile;  // steps to a parent with patches of its own; of those without any: the first
+    uint16_t steps[cells_per_tile];
+    bool any = false;
+    for (uint32_t p = 0; p < cells_per_tile; ++p) {
+        if (!has_surface(to, p)) continue;
+        const bool seen = patches_of(to.placed.pattern[p]).count > 0;
+        steps[p] = seen ? 0 : uint16_t(orphan + p), any = any || !seen;
+    }
+    const auto follow = [&](uint32_t p, uint32_t other) {
+        const uint16_t so = steps[other] < orphan ? uint16_t(steps[other] + 1) : steps[other];
+        if (so >= steps[p]) return false;
+        steps[p] = so, to.placed.vertex[p] = to.placed.vertex[other], to.placed.pattern[p] = to.placed.pattern[other];
+        return true;
+    };
+    for (bool more = any; more;) {
+        more = false;
+        for (uint32_t p = 0; p < cells_per_tile; ++p)
+            for (uint32_t axis = 0; axis < 3; ++axis) {
+                const uint32_t next = p + (1u << 3 * axis);
+                if ((p >> 3 * axis & 7) == 7 || !has_surface(to, p) || !has_surface(to, next)) continue;
+                if (steps[p] != steps[next] && joined(tile, p, axis)) more = more | follow(p, next) | follow(next, p);
+            }
+    }
+}
+
 void move_to_parent(const MesherScratch& s, const Tile& tile, uint32_t cell, Vertex& v) noexcept {
     const Tile& parents = s.parents.tile;
     const uint32_t parent = parent_cell(tile, cell);
-    if (!(parents.surface[parent / 8] >> parent % 8 & 1)) return;
     const uint32_t count = patches_of(parents.placed.pattern[parent]).count;
     const Vertex& to = match(s.parents.vertex + parents.placed.vertex[parent], count, v);
     const float share = s.parents.morph[parent];

@@ -243,7 +243,10 @@ void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
     for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
     list_candidates(m, s, tile);
     const bool morphs = find_parents(m, s, tile);
-    if (morphs) place_cells(m, s, s.parents.tile, {m, nullptr, false});
+    if (morphs) {
+        place_cells(m, s, s.parents.tile, {m, nullptr, false});
+        adopt_orphans(s, tile);
+    }
     place_cells(m, s, tile, {m, &tile, morphs});
 }
 

@@ -177,7 +177,9 @@ uint32_t prepare_turn_specks(void* mesher);
 // cells_to_parents.cpp: vertices on their way to where larger cells would have them
 /// Fills s.parents.tile with what lies there by the corners it shares with the tile; false: nothing of it moves yet.
 bool find_parents(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept;
-/// Moves a vertex of a cell of the tile towards that of the parent. s.parents is placed.
+/// s.parents is placed: parents that no corner of theirs tells of the surface take the vertices of others in the tile.
+void adopt_orphans(MesherScratch& s, const Tile& tile) noexcept;
+/// Moves a vertex of a cell of the tile towards that of its parent.
 void move_to_parent(const MesherScratch& s, const Tile& tile, uint32_t cell, Vertex& vertex) noexcept;
 
 // cells_to_vertices.cpp
