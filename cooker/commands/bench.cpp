@@ -193,7 +193,7 @@ int bench_command(const BenchOptions& options) {
                           {"mean_pixels", e.mean},
                           {"p99_pixels", e.p99},
                           {"max_pixels", e.max},
-                          {"total_us", e.microseconds}});
+                          {"processor_us", e.microseconds}});
     const double rill_rate = passes[1].triangles_per_second(stage_processor), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
     const nlohmann::json json = {
         {"report", "rill bench"},

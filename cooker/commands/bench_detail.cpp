@@ -53,7 +53,7 @@ std::vector<ScreenError> screen_errors(BenchPlayer& player, const std::vector<ui
             const glm::vec3 eye = eye_at(player.info(), distances[d]);
             Mesh mesh;
             player.look_from(eye, pixels_per_radian, pixel_error_asked);
-            microseconds[d] += player.play(seconds, 0, &mesh).microseconds[stage_total];
+            microseconds[d] += player.play(seconds, 0, &mesh).microseconds[stage_processor];
             triangles[d] += double(mesh.triangles.size());
             add_both_ways(pixels[d], mesh, whole, eye);
         }

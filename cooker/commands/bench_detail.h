@@ -16,7 +16,7 @@ struct ScreenError {
     float diagonals = 0;                  ///< distance of the eye from the middle of the bounds, in their diagonals
     double mean = 0, p99 = 0, max = 0;    ///< pixels
     double triangles = 0;                 ///< share of those at the source's resolution
-    double microseconds = 0;              ///< a frame
+    double microseconds = 0;              ///< of processor time a frame
 };
 /// How far the surface jumps under a camera that moves away, the liquid standing still; over the area of the surfaces before
 /// and after a move, each to the other, in pixels at that place. All figures are those of the move where they are worst.

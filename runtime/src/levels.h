@@ -44,7 +44,7 @@ struct Levels {
     /// 0 … 1. A box is undivided once its nearest point is reach · its cells away: all in it is 1 by then, and 0
     /// again as part of the larger box, whose farthest point is a diagonal on.
     float morph(int32_t level, const float place[3]) const {
-        constexpr float diagonal = 14, begin = 1.5f, end = 2;  // √3 · tile_cells and a bit, in cells; shares of the reach
+        constexpr float diagonal = 14, begin = 1.7f, end = 2;  // √3 · tile_cells and a bit, in cells; shares of the reach
         static_assert(least_reach + diagonal < end * least_reach);
         float least = level < coarsest() ? 1.f : 0.f;
         for (uint32_t e = 0; e < eye_count && least > 0; ++e) {
