@@ -145,7 +145,7 @@ void adopt_orphans(MesherScratch& s, const Tile& tile) noexcept {
             for (uint32_t axis = 0; axis < 3; ++axis) {
                 const uint32_t next = p + (1u << 3 * axis);
                 if ((p >> 3 * axis & 7) == 7 || !has_surface(to, p) || !has_surface(to, next)) continue;
-                if (steps[p] != steps[next] && joined(tile, p, axis)) more = more | follow(p, next) | follow(next, p);
+                if (steps[p] != steps[next] && joined(tile, p, axis)) more = follow(p, next) || follow(next, p) || more;
             }
     }
 }
