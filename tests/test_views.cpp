@@ -133,6 +133,30 @@ TEST_CASE("what is in sight does not depend on what is out of it") {
     CHECK(missing == 0);
 }
 
+TEST_CASE("a camera that trembles asks for nothing new") {
+    Opened opened(blocky_ball());
+    REQUIRE(opened.open() == Status::ok);
+    Playing playing(opened);
+    set_identity(playing.frame.asset_to_world);
+    playing.frame.view_count = 1;
+    playing.frame.budget.pixel_error = 4;
+    const auto look_from = [&](float distance) {
+        const rill::View view = everything({distance, 0, 0});
+        playing.frame.views = &view;
+        CHECK(playing.stream(0.1) == Status::ok);
+        return playing.stats.layers_wanted;
+    };
+    uint32_t changes = 0, trembles = 0, held = 0;
+    for (float distance = 2; distance < 100; distance *= 1.03f) {
+        look_from(1.02f * distance), look_from(0.98f * distance);
+        const uint32_t wanted = look_from(distance);
+        changes += held && wanted != held, held = wanted;
+        for (const float shaken : {1.02f, 0.98f, 1.f}) trembles += look_from(shaken * distance) != held;
+    }
+    CHECK(changes > 0);
+    CHECK(trembles == 0);
+}
+
 TEST_CASE("no open edge in sight at random cameras, and finer where it is nearer") {
     Opened opened(make_ball({.points = 2400}));
     REQUIRE(opened.open() == Status::ok);

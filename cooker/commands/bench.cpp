@@ -188,7 +188,12 @@ int bench_command(const BenchOptions& options) {
     for (const Pass& pass : details) frame_allocations += pass.frame_allocations, list.push_back(to_json(pass));
     nlohmann::json screen = nlohmann::json::array();
     for (const ScreenError& e : far)
-        screen.push_back({{"diagonals", e.diagonals}, {"triangles_share", e.triangles}, {"mean_pixels", e.mean}, {"p99_pixels", e.p99}, {"max_pixels", e.max}});
+        screen.push_back({{"diagonals", e.diagonals},
+                          {"triangles_share", e.triangles},
+                          {"mean_pixels", e.mean},
+                          {"p99_pixels", e.p99},
+                          {"max_pixels", e.max},
+                          {"processor_us", e.microseconds}});
     const double rill_rate = passes[1].triangles_per_second(stage_processor), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
     const nlohmann::json json = {
         {"report", "rill bench"},
@@ -204,7 +209,13 @@ int bench_command(const BenchOptions& options) {
         {"scaling", scaling},
         {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
         {"camera_jumps",
-         {{"moves", camera.moves}, {"changes", camera.changes}, {"mean_pixels", camera.mean}, {"p99_pixels", camera.p99}, {"max_pixels", camera.max}, {"above_share", camera.above}}},
+         {{"moves", camera.moves},
+          {"changes", camera.changes},
+          {"above_cell", camera.above_cell},
+          {"mean_pixels", camera.mean},
+          {"p99_pixels", camera.p99},
+          {"max_pixels", camera.max},
+          {"above_share", camera.share_above}}},
         {"draco",
          {{"bits", 10},
           {"speed", 0},
@@ -221,10 +232,11 @@ int bench_command(const BenchOptions& options) {
                     static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
                     readable_bytes(memory["peak_bytes"].get<double>()).c_str());
         for (const ScreenError& e : far)
-            std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
-                        double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.mean, e.p99, e.max);
-        std::printf("moving away from 1 to 8 diagonals: %u of %u moves change the surface, by %.2f pixels on average, p99 %.2f, max %.1f; %.3f %% of it by more than %g\n",
-                    camera.changes, camera.moves, camera.mean, camera.p99, camera.max, 100 * camera.above, double(pixel_error_asked));
+            std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles in %.1f ms, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
+                        double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.microseconds / 1000, e.mean, e.p99, e.max);
+        std::printf("moving away from 1 to 8 diagonals: %u of %u moves change the surface, the worst by %.2f pixels on average, p99 %.2f, max %.1f; "
+                    "%u move something of it by more than %g, the worst %.3f %%\n",
+                    camera.changes, camera.moves, camera.mean, camera.p99, camera.max, camera.above_cell, double(pixel_error_asked), 100 * camera.share_above);
         if (draco_rate > 0)
             std::printf("Draco decodes the same meshes at %.2f Mtri/s (10 bits, one core, processor time): Rill runs at %.2f times that\n", draco_rate / 1e6,
                         rill_rate / draco_rate);

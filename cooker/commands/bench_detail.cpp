@@ -4,38 +4,32 @@
 #include <algorithm>
 #include <limits>
 
-#include "surface_distance.h"
-
 namespace rill::cooker {
 namespace {
 
 constexpr size_t most_frames = 8;
-constexpr float distances[] = {1, 2, 4, 8};
+constexpr float distances[] = {1, 2, 4, 6, 8};
 
-struct Pixels {
-    std::vector<float> all;
-    double triangles = 0, triangles_whole = 0;
-
-    /// From every vertex of `from` to the other surface.
-    void add(const Mesh& from, const SurfaceIndex& to, const glm::vec3& eye) {
-        for (const glm::vec3& x : from.positions)
-            all.push_back(to.closest(x, std::numeric_limits<float>::infinity()).distance * pixels_per_radian / glm::distance(x, eye));
+/// How far one surface is from another, in pixels at that place; over the area of both.
+void add_pixels(Spread& pixels, const Mesh& from, const SurfaceIndex& to, const glm::vec3& eye) {
+    std::vector<float> area(from.positions.size());
+    for (const auto& t : from.triangles) {
+        const glm::vec3 a = from.positions[t[0]], b = from.positions[t[1]], c = from.positions[t[2]];
+        const float third = glm::length(glm::cross(b - a, c - a)) / 6;
+        for (int k = 0; k < 3; ++k) area[t[k]] += third;
     }
-    /// Mean, p99 and max into a report.
-    template <class Report>
-    void sum_up(Report& report) {
-        if (all.empty()) return;
-        std::sort(all.begin(), all.end());
-        for (float pixels : all) report.mean += pixels / double(all.size());
-        report.p99 = all[size_t(0.99 * double(all.size() - 1))], report.max = all.back();
+    for (size_t v = 0; v < area.size(); ++v) {
+        if (!(area[v] > 0)) continue;  // shrunk to nothing: not seen
+        const glm::vec3& x = from.positions[v];
+        const float distance = to.closest(x, std::numeric_limits<float>::infinity()).distance;
+        pixels.add(distance * pixels_per_radian / glm::distance(x, eye), area[v]);
     }
-    ScreenError result(float diagonals) {
-        ScreenError error{diagonals};
-        error.triangles = triangles_whole > 0 ? triangles / triangles_whole : 0;
-        sum_up(error);
-        return error;
-    }
-};
+}
+void add_both_ways(Spread& pixels, const Mesh& a, const Mesh& b, const glm::vec3& eye) {
+    if (a.triangles.empty() || b.triangles.empty()) return;
+    add_pixels(pixels, a, SurfaceIndex(b), eye);
+    add_pixels(pixels, b, SurfaceIndex(a), eye);
+}
 
 /// Where the eye stands, so many diagonals of the bounds away from their middle.
 glm::vec3 eye_at(const AssetInfo& info, float diagonals) {
@@ -46,28 +40,29 @@ glm::vec3 eye_at(const AssetInfo& info, float diagonals) {
 }  // namespace
 
 std::vector<ScreenError> screen_errors(BenchPlayer& player, const std::vector<uint32_t>& frames) {
-    Pixels pixels[std::size(distances)];
+    Spread pixels[std::size(distances)];
+    double triangles[std::size(distances)] = {}, microseconds[std::size(distances)] = {}, triangles_whole = 0;
     const size_t count = std::min(most_frames, frames.size());
     for (size_t k = 0; k < count; ++k) {
         const double seconds = player.seconds_of(frames[frames.size() * k / count]);
         Mesh whole;
         player.look(0, false);
         player.play(seconds, 0, &whole);
-        const SurfaceIndex whole_index(whole);
+        triangles_whole += double(whole.triangles.size());
         for (size_t d = 0; d < std::size(distances); ++d) {
             const glm::vec3 eye = eye_at(player.info(), distances[d]);
             Mesh mesh;
             player.look_from(eye, pixels_per_radian, pixel_error_asked);
-            player.play(seconds, 0, &mesh);
-            pixels[d].triangles += double(mesh.triangles.size()), pixels[d].triangles_whole += double(whole.triangles.size());
-            if (mesh.triangles.empty() || whole.triangles.empty()) continue;
-            pixels[d].add(mesh, whole_index, eye);
-            pixels[d].add(whole, SurfaceIndex(mesh), eye);
+            microseconds[d] += player.play(seconds, 0, &mesh).microseconds[stage_processor];
+            triangles[d] += double(mesh.triangles.size());
+            add_both_ways(pixels[d], mesh, whole, eye);
         }
     }
     player.look(0, false);
     std::vector<ScreenError> errors;
-    for (size_t d = 0; d < std::size(distances); ++d) errors.push_back(pixels[d].result(distances[d]));
+    for (size_t d = 0; d < std::size(distances); ++d)
+        errors.push_back({distances[d], pixels[d].mean(), pixels[d].p99(), pixels[d].max,
+                          triangles_whole > 0 ? triangles[d] / triangles_whole : 0, count ? microseconds[d] / double(count) : 0});
     return errors;
 }
 
@@ -75,7 +70,6 @@ CameraJumps camera_jumps(BenchPlayer& player, const std::vector<uint32_t>& frame
     constexpr size_t most = 3;
     constexpr float nearest = 1, farthest = 8, step = 1 + 1 / 30.f;
     CameraJumps jumps;
-    Pixels pixels;
     const size_t count = std::min(most, frames.size());
     for (size_t k = 0; k < count; ++k) {
         const double seconds = player.seconds_of(frames[frames.size() * (2 * k + 1) / (2 * count)]);
@@ -86,21 +80,24 @@ CameraJumps camera_jumps(BenchPlayer& player, const std::vector<uint32_t>& frame
             Mesh mesh;
             player.look_from(eye, pixels_per_radian, pixel_error_asked);
             const uint64_t now = player.play(seconds, 0, &mesh).hash;
-            const bool first = diagonals == nearest;
-            jumps.moves += !first;
-            if (!first && now != hash && !mesh.triangles.empty() && !before.triangles.empty()) {
-                ++jumps.changes;
-                pixels.add(mesh, SurfaceIndex(before), eye);
-                pixels.add(before, SurfaceIndex(mesh), eye);
+            if (diagonals > nearest) {
+                Spread pixels;
+                if (now != hash) add_both_ways(pixels, before, mesh, eye);
+                jumps.add(pixels);
             }
             before = std::move(mesh), hash = now;
         }
     }
     player.look(0, false);
-    pixels.sum_up(jumps);
-    const auto above = pixels.all.end() - std::upper_bound(pixels.all.begin(), pixels.all.end(), pixel_error_asked);
-    if (!pixels.all.empty()) jumps.above = double(above) / double(pixels.all.size());
     return jumps;
+}
+
+void CameraJumps::add(const Spread& pixels) {
+    const double large = pixels.weight > 0 ? 1 - pixels.histogram.share_below(pixel_error_asked) : 0;
+    ++moves;
+    changes += pixels.max > 0, above_cell += pixels.max > pixel_error_asked;
+    mean = std::max(mean, pixels.mean()), p99 = std::max(p99, pixels.p99()), max = std::max(max, pixels.max);
+    share_above = std::max(share_above, large);
 }
 
 }  // namespace rill::cooker

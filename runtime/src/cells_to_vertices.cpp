@@ -116,7 +116,7 @@ void add_crossing(const EdgePlace& edge, const float* value, float (&total)[4]) 
     for (uint32_t a = 0; a < 4; ++a) total[a] += edge.corner[a] + crossing * edge.along[a];
 }
 
-/// Appends the patches of a cell to the batch: mean of their crossings.
+/// Appends the patches of a cell to the batch: mean of their crossings. Without any: its middle.
 void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
     const float* value = corner_values(tile, cell);
     float sum[4][4] = {};
@@ -124,11 +124,13 @@ void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const Cell
         float total[4] = {};
         for_bits(patches.crossed, [&](uint32_t e) { add_crossing(edge_places[e], value, total); });
         std::copy(total, total + 4, sum[0]);
-    } else {
+    } else if (patches.count) {
         for_bits(patches.crossed, [&](uint32_t e) { add_crossing(edge_places[e], value, sum[patches.patch[e]]); });
+    } else {
+        std::fill(sum[0], sum[0] + 3, 0.5f), sum[0][3] = 1;
     }
     const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
-    for (uint32_t p = 0; p < patches.count; ++p, ++n) {
+    for (uint32_t p = 0; p < std::max<uint32_t>(patches.count, 1); ++p, ++n) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};
         const float share = 1 / sum[p][3];
         for (uint32_t a = 0; a < 3; ++a) {
@@ -165,24 +167,47 @@ void step(MesherScratch& s, const Tile& tile, uint32_t i) {
     }
 }
 
+bool is_moving(const Mesher& m) { return m.input.velocity && m.input.target && m.input.target->velocity.data; }
+
 void write3(const Stream& stream, uint32_t index, const float v[3]) {
     if (stream.data)
         std::memcpy(static_cast<uint8_t*>(stream.data) + size_t(index) * stream.stride, v, 3 * sizeof(float));
 }
 
-/// Moves a batch of n vertices onto the field and writes them from `first_vertex` on.
-void finish_batch(const Mesher& m, MesherScratch& s, Tile& tile, uint32_t n, uint32_t first_vertex) {
-    const bool moving = m.input.velocity && m.input.target && m.input.target->velocity.data;
-    float* velocity = moving ? s.velocity : nullptr;
+/// Where vertices go: to the target, moved to their parents' if they morph; or they are those parents'.
+struct Output {
+    const Mesher& m;
+    Tile* drawn;  ///< null: vertices of parents
+    bool morphs;
+
+    void write(MesherScratch& s, uint32_t i, uint32_t cell, Vertex& v) const {
+        if (!drawn) {
+            s.parents.vertex[i] = v;
+            return;
+        }
+        if (morphs) move_to_parent(s, *drawn, cell, v);
+        const uint32_t vertex = drawn->first_vertex + i;
+        std::memcpy(m.position + 3 * size_t(vertex), v.position, sizeof(v.position));
+        cover(*drawn, v.position);
+        if (!m.input.target) return;
+        write3(m.input.target->position, vertex, v.position);
+        write3(m.input.target->normal, vertex, v.normal);
+        if (is_moving(m)) write3(m.input.target->velocity, vertex, v.velocity);
+    }
+};
+
+/// Moves a batch of n vertices onto the field and writes them, as vertices `begin` and on of the tile.
+void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, uint32_t begin, const Output& output) {
+    float* velocity = is_moving(m) ? s.velocity : nullptr;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
         m.access.evaluate_at_surface(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
                                    batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
                                    velocity, trusted_cells * tile.cell);
         for (uint32_t i = first; i < first + batch; ++i) {
             step(s, tile, i);
-            const uint32_t slot = s.slot[i], vertex = first_vertex + slot;
-            const float p[3] = {s.x[i], s.y[i], s.z[i]};
-            float normal[3] = {s.gx[i], s.gy[i], s.gz[i]};
+            const uint32_t slot = s.slot[i];
+            Vertex vertex{{s.x[i], s.y[i], s.z[i]}, {s.gx[i], s.gy[i], s.gz[i]}, {}};
+            float(&normal)[3] = vertex.normal;
             float length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
             if (!(length2 > 1e-12f && length2 < 1e12f) || !(std::abs(s.value[i]) < surface::unsupported)) {
                 guess_normal(m, tile, s.cell[slot], s.patch[slot], normal);
@@ -190,37 +215,39 @@ void finish_batch(const Mesher& m, MesherScratch& s, Tile& tile, uint32_t n, uin
             }
             const float scale = 1 / std::sqrt(length2);
             for (float& c : normal) c *= scale;
-            std::memcpy(m.position + 3 * size_t(vertex), p, sizeof(p));
-            cover(tile, p);
-            if (!m.input.target) continue;
-            write3(m.input.target->position, vertex, p);
-            write3(m.input.target->normal, vertex, normal);
-            if (!moving) continue;
-            const float* v = velocity + (i - first);
-            const float speed[3] = {v[0], v[batch], v[2 * batch]};
-            write3(m.input.target->velocity, vertex, speed);
+            for (uint32_t a = 0; a < 3 && velocity; ++a) vertex.velocity[a] = velocity[i - first + a * batch];
+            output.write(s, begin + slot, s.cell[slot], vertex);
         }
     });
 }
 
-void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
+/// The vertices of all surface cells of a tile. The corner values are used up then; what the quads need takes their place.
+void place_cells(const Mesher& m, MesherScratch& s, Tile& tile, const Output& output) {
     uint32_t n = 0, done = 0;
-    for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
-    list_candidates(m, s, tile);
     for_surface_cells(tile, [&](uint32_t cell) {
         const CellPattern pattern = pattern_at(m, tile, cell);
         s.pattern[cell] = pattern, s.vertex[cell] = uint16_t(done + n);
         if (n + 4 > MesherScratch::capacity) {
-            finish_batch(m, s, tile, n, tile.first_vertex + done);
+            finish_batch(m, s, tile, n, done, output);
             done += n, n = 0;
         }
         place_patches(s, tile, cell, patches_of(pattern), n);
     });
-    finish_batch(m, s, tile, n, tile.first_vertex + done);
-    // The corner values are used up; what the quads need takes their place.
+    finish_batch(m, s, tile, n, done, output);
     for_surface_cells(tile, [&](uint32_t cell) {
         tile.placed.vertex[cell] = s.vertex[cell], tile.placed.pattern[cell] = s.pattern[cell];
     });
+}
+
+void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
+    for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
+    list_candidates(m, s, tile);
+    const bool morphs = find_parents(m, s, tile);
+    if (morphs) {
+        place_cells(m, s, s.parents.tile, {m, nullptr, false});
+        adopt_orphans(s, tile);
+    }
+    place_cells(m, s, tile, {m, &tile, morphs});
 }
 
 }  // namespace

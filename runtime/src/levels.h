@@ -40,6 +40,21 @@ struct Levels {
         }
         return false;
     }
+    /// How far what is drawn at a place with cells of this level has turned into what cells twice as large would draw there,
+    /// 0 … 1. A box is undivided once its nearest point is reach · its cells away: all in it is 1 by then, and 0
+    /// again as part of the larger box, whose farthest point is a diagonal on.
+    float morph(int32_t level, const float place[3]) const {
+        constexpr float diagonal = 14, begin = 1.7f, end = 2;  // √3 · tile_cells and a bit, in cells; shares of the reach
+        static_assert(least_reach + diagonal < end * least_reach);
+        float least = level < coarsest() ? 1.f : 0.f;
+        for (uint32_t e = 0; e < eye_count && least > 0; ++e) {
+            float squared = 0;
+            for (int a = 0; a < 3; ++a) squared += (place[a] - eyes[e][a]) * (place[a] - eyes[e][a]);
+            const float from = std::max(begin * reach[e], reach[e] + diagonal), to = end * reach[e];
+            least = std::min(least, (std::sqrt(squared) / cell(level) - from) / (to - from));
+        }
+        return std::max(least, 0.f);
+    }
     /// Cells 2^octaves times as large, wherever the eyes allow no more by distance: the smallest, too.
     void coarsen(float octaves) {
         float left = octaves;

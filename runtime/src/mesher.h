@@ -59,6 +59,19 @@ inline uint8_t surface_cells(const Tile& tile, uint32_t row) {
     return uint8_t(mixed(c[0] | c[1] | c[9] | c[10], c[0] & c[1] & c[9] & c[10]));
 }
 
+/// A vertex on its way to the target.
+struct Vertex {
+    float position[3], normal[3], velocity[3];
+};
+
+/// Cells twice as large in the place of a tile's own, towards which its vertices move: see cells_to_parents.cpp.
+struct ParentCells {
+    static constexpr uint32_t corners = 125, cells = 64;
+    Tile tile;                       ///< of these cells; an eighth of it is filled in, where our tile lies in it
+    float morph[cells_per_tile];     ///< by its cells: how far what lies in them has moved
+    Vertex vertex[4 * cells];        ///< as tile.placed counts them
+};
+
 /// Batches of positions on their way through the field; one per worker. Evaluation may reorder a batch, so
 /// `slot` travels with each position.
 struct MesherScratch {
@@ -72,6 +85,7 @@ struct MesherScratch {
     uint8_t patch[capacity];
     uint16_t vertex[cells_per_tile];
     CellPattern pattern[cells_per_tile];
+    ParentCells parents;
     uint64_t corners_evaluated;
 };
 
@@ -160,6 +174,14 @@ void run_march(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_find_specks(void* mesher);
 void run_find_specks(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_turn_specks(void* mesher);
+
+// cells_to_parents.cpp: vertices on their way to where larger cells would have them
+/// Fills s.parents.tile with what lies there by the corners it shares with the tile; false: nothing of it moves yet.
+bool find_parents(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept;
+/// s.parents is placed: parents that no corner of theirs tells of the surface take the vertices of others in the tile.
+void adopt_orphans(MesherScratch& s, const Tile& tile) noexcept;
+/// Moves a vertex of a cell of the tile towards that of its parent.
+void move_to_parent(const MesherScratch& s, const Tile& tile, uint32_t cell, Vertex& vertex) noexcept;
 
 // cells_to_vertices.cpp
 uint32_t prepare_counts(void* mesher);

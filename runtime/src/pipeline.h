@@ -126,7 +126,8 @@ struct Plan {
     uint32_t view_count;
     FrustumPlanes views[most_views];   ///< asset space
     float eyes[most_views][3];         ///< asset space
-    Levels levels;                 ///< as asked; kept from frame to frame while the views hardly move (hysteresis)
+    Levels levels;                 ///< as asked
+    Levels levels_held;            ///< kept from frame to frame while the views hardly move: chooses what is read
     Levels levels_drawn;           ///< with the detail given up for the sake of time
     Detail detail;
     uint32_t blocks_in_view;

@@ -13,8 +13,9 @@ constexpr float automatic_pixel_error = 2;  ///< Budget::pixel_error 0
 /// surface was off by a p99 of 2.6 pixels for no fewer triangles; with .5 by about a pixel from anywhere.
 constexpr float most_error = 0.5f;
 constexpr float most_cells_across = 1 << 20;
-/// Cells stay as they are while an eye moves by no more than this share of its distance, and the sizes asked for
-/// change by no more than this many octaves: a camera that trembles changes nothing.
+/// Wants stay as they are while an eye moves by no more than this share of its distance, and the sizes asked for change by
+/// no more than this many octaves: a camera that trembles asks for nothing new. (What is drawn follows it exactly, without
+/// jumps: cells_to_parents.cpp.)
 constexpr float most_drift = 1 / 8.f;
 
 /// World planes and eyes into asset space. The matrix is rotation · scale | translation, so its inverse
@@ -124,9 +125,8 @@ uint32_t layers_for(const Directory& directory, const Frame& frame, float cell_s
 
 void choose_detail(const Directory& directory, const Frame& frame, Plan& plan) {
     const Sight sight = look(directory, plan);
-    const Levels asked = levels_asked(directory, frame, plan);
-    if (!alike(plan.levels, asked, sight)) plan.levels = asked;
-    plan.levels_drawn = plan.levels;
+    plan.levels = plan.levels_drawn = levels_asked(directory, frame, plan);
+    if (!alike(plan.levels_held, plan.levels, sight)) plan.levels_held = plan.levels;
     plan.detail = {};
     for (uint32_t v = 0; v < plan.view_count; ++v)
         if (sight.nearest[v] < 1e15f)
@@ -144,7 +144,7 @@ BlockLayers layers_of_blocks(const Directory& directory, const Frame& frame, uin
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
         if (!is_seen(plan, chunk)) continue;
-        const uint32_t wanted = layers_for(directory, frame, cell_at(plan.levels, chunk));
+        const uint32_t wanted = layers_for(directory, frame, cell_at(plan.levels_held, chunk));
         layers.count[chunk.block] = uint8_t(std::max<uint32_t>(layers.count[chunk.block], wanted));
     }
     return layers;

@@ -137,7 +137,8 @@ struct View {
 };
 /// 0 = no cap / automatic, for every field.
 struct Budget {
-    float pixel_error;     ///< size of a cell on the screen aimed at; needs at least one View
+    float pixel_error;     ///< size of a cell on the screen aimed at; needs at least one View. Where eyes go in small steps
+                           ///< vertices do as well: they go from cells of one size to those of the next
     float cell_size;       ///< if > 0: this cell size (asset space), whatever the views say
     uint32_t layers;       ///< use at most so many layers
     uint32_t points;       ///< per frame
