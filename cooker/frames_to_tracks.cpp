@@ -10,7 +10,6 @@
 namespace rill::cooker {
 namespace {
 
-constexpr int coding_rounds = 2;
 constexpr int last_mendings = 3;  // README.md, "Spurs"
 // Tolerances: what bears points while tracks grow (the field off the source's vertices, the decoded mesh off the source), and mends.
 constexpr float missed_by = 1, spur_beyond = 4, repair_beyond = 2.5f;
@@ -28,7 +27,7 @@ struct Loss {
 };
 constexpr Loss surplus_loss{0.3f, 0.1f};   // a point on its way; .2 and .45 tolerances: 0 and +2.5 %; of points that mend a frame
                                            // .6, born at 3 tolerances: −.9 %, but rims of dam_break 41 were torn
-constexpr Loss fleeting_loss{0.65f, 0.3f}; // one that lives for so few frames that its birth is most of its bytes
+constexpr Loss fleeting_loss{0.9f, 0.4f};  // one that lives for so few frames that its birth is most of its bytes
 constexpr size_t fleeting = 4;             // frames
 
 /// Spacing that thinning leaves, metres. What quadratics leave grows with its cube. Wider patches outreach the liquid's depth, and
@@ -191,6 +190,17 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std:
     for (int s = 0; s < window.samples(); ++s) changed[size_t(s)] = grown_at(s);
 }
 
+/// Corrections in all frames, against what the tracks decode to.
+void correct_window(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+    parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
+        const SurfaceFrame& frame = *window.frames[s];
+        std::vector<uint32_t> ids;
+        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
+        const Residual residual = measure_residual(frame, points);
+        correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
+    });
+}
+
 /// Takes out tracks of few frames that their neighbours nearly make up for in each of them: the least missed first, and of
 /// neighbours only one. What comes from the window before stays: it would be missed at the border.
 void drop_fleeting(Window& window, CodedWindow& coded, const WindowGoal& goal) {
@@ -337,16 +347,9 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     mend(window, coded, goal, changed);
     code_from(grown);
     drop_fleeting(window, coded, goal);
-    for (int round = 0; round < coding_rounds; ++round) {
-        parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
-            const SurfaceFrame& frame = *window.frames[s];
-            std::vector<uint32_t> ids;
-            const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
-            const Residual residual = measure_residual(frame, points);
-            correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
-        });
-        code_from(0);
-    }
+    correct_window(window, coded, goal);
+    code_from(0);
+    refit_tracks(window, coded, goal, tables);
     for (int round = 0; round < trimmings; ++round) code(trim_strays(window, coded, goal));
     // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
     changed.assign(window.frames.size(), true);
@@ -354,6 +357,10 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         const size_t mended = window.paths.size();
         mend(window, coded, goal, changed);
         code_from(mended);
+        if (round > 0) continue;
+        // Births change what is around them; and whatever this tears is mended by the next round.
+        refit_tracks(window, coded, goal, tables);
+        changed.assign(window.frames.size(), true);
     }
     for (const TrackSamples& drop : track_drops(window)) {
         coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));

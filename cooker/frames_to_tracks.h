@@ -25,6 +25,8 @@ struct CodedWindow {
 void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal);
 /// Quantises the tracks and corrects them against what they decode to.
 CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables);
+/// Chooses the coefficients of all tracks anew, so that together they decode to the least error for their bits.
+void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
 /// Those that reach the last sample, as one-sample paths: what the next window continues.
 std::vector<Path> survivors_of(const Window& window);
 /// Decoded points at a sample, with the tracks they belong to; only layers ≤ last_layer.

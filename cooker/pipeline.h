@@ -8,6 +8,7 @@
 //   tracks_to_surface      what the tracks decode to, measured at every source vertex; corrections
 //   points_to_repairs      what coding has torn is mended, by trial
 //   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
+//   refit_tracks           coefficients chosen anew, against the surface that all tracks decode to together
 //   coefficients_to_layers progressive order, blocks
 //   layers_to_chunks       entropy coding
 //   chunks_to_asset        the file

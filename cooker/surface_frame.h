@@ -14,6 +14,15 @@ struct SurfacePoint {
     glm::vec3 position{}, normal{}, velocity{};
 };
 
+/// Two unit vectors across a unit normal.
+struct TangentFrame {
+    glm::vec3 t1, t2;
+};
+inline TangentFrame tangent_frame(const glm::vec3& n) {
+    const glm::vec3 t1 = glm::normalize(glm::cross(n, std::fabs(n.z) < 0.9f ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0)));
+    return {t1, glm::cross(n, t1)};
+}
+
 /// Nearest-vertex queries over one mesh; immutable, thread safe.
 class VertexTree {
 public:

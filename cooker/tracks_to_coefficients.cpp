@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
-#include "lattice_tracks.h"
 #include "mesh.h"
+#include "track_basis.h"
 
 namespace rill::cooker {
 namespace {
@@ -24,19 +24,6 @@ constexpr double rounded_up_from = 0.75;
 constexpr double least_planar = 0.4;
 /// A life with a normal further than this from the axis has no tangential slack.
 constexpr double least_slack = 0.6;
-
-/// One basis on one life, as rows of values per sample.
-struct Basis {
-    uint32_t samples, terms;
-    bool cosine;
-    std::vector<std::array<float, max_terms>> row;
-
-    Basis(const format::BasisTables& tables, uint32_t life, bool plain)
-        : samples(life), terms(format::most_terms(life, plain)), cosine(plain), row(life) {
-        for (uint32_t s = 0; s < samples; ++s)
-            format::basis_row(tables, samples, cosine, s, terms, row[s].data(), nullptr);
-    }
-};
 
 using Signal = std::vector<double>;
 using Series = std::vector<double>;
@@ -78,9 +65,8 @@ int32_t quantised(double value, double step) {
     return checked(std::copysign(std::max(1.0, std::floor(v + 1 - rounded_up_from)), value));
 }
 
-/// Bits of a coefficient, roughly, and what a squared error of one step is worth in bits (the slope of the
-/// rate–distortion curve); and what it is worth to keep a tolerance at every sample.
-double cost_of(int32_t v) { return v == 0 ? 0.3 : 2 + 1.6 * std::log2(std::abs(double(v))); }
+/// What a squared error of one step is worth in bits (the slope of the rate–distortion curve); and what it is worth to keep
+/// a tolerance at every sample.
 constexpr double bits_per_error = 6.5, bits_per_broken_tolerance = 8;
 
 struct Coded {
@@ -109,33 +95,6 @@ Coded quantise_series(const Basis& basis, const Signal& signal, double tolerance
     return out;
 }
 
-template <size_t channels>
-using Rows = std::array<std::array<int32_t, channels>, max_terms>;
-
-template <size_t channels>
-uint32_t terms_used(const Rows<channels>& rows) {
-    uint32_t terms = max_terms;
-    while (terms > 1 &&
-           std::all_of(rows[terms - 1].begin(), rows[terms - 1].end(), [](int32_t v) { return v == 0; }))
-        --terms;
-    return terms;
-}
-template <size_t channels>
-std::vector<int32_t> flattened(const Rows<channels>& rows) {
-    std::vector<int32_t> out;
-    for (uint32_t k = 0; k < terms_used(rows); ++k) out.insert(out.end(), rows[k].begin(), rows[k].end());
-    return out;
-}
-
-struct FrameAxes {
-    dvec3 t1, t2, n;
-};
-FrameAxes axes_of(const int32_t axis[2], int32_t levels) {
-    const format::Frame f = format::frame_of(axis, levels);
-    const auto row = [&](int r) { return dvec3(f.row[r][0], f.row[r][1], f.row[r][2]) / 16384.0; };
-    return {row(0), row(1), row(2)};
-}
-
 /// How a track is about to be coded on one basis: everything but the choice between bases.
 struct Attempt {
     QuantisedTrack track;
@@ -157,8 +116,8 @@ struct Fitter {
 
     uint32_t life() const { return uint32_t(samples.position.size()); }
     double tangent_step() const { return double(steps.step) * steps.ratio / 16; }
-    double motion_step() const { return steps.step * std::sqrt(double(life())) * format::position_gain; }
-    double turn_step() const { return steps.normal_step * std::sqrt(double(life())) * format::normal_gain; }
+    double motion_step() const { return cooker::motion_step(steps, life()); }
+    double turn_step() const { return cooker::turn_step(steps, life()); }
     dvec3 position(uint32_t s) const { return dvec3(samples.position[s]) - origin; }
 
     /// The direction the life's normals are planar about, and whether they are.

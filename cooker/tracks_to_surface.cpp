@@ -35,14 +35,6 @@ void ask_probes(const SurfaceFrame& frame, const surface::Field& field, uint32_t
     }
 }
 
-struct TangentFrame {
-    glm::vec3 t1, t2;
-};
-TangentFrame tangent_frame(const glm::vec3& n) {
-    const glm::vec3 t1 = glm::normalize(glm::cross(n, std::fabs(n.z) < 0.9f ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0)));
-    return {t1, glm::cross(n, t1)};
-}
-
 }  // namespace
 
 Path Path::born(const SurfacePoint& at, float radius, int sample) {

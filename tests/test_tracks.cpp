@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which tracks a window keeps: brief ones that their neighbours make up for go, those that mend a frame end when it is
-// mended, and ends that coding takes off the surface are cut.
+// mended, and ends that coding takes off the surface are cut. And coefficients chosen against what all tracks decode to.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
@@ -9,6 +9,7 @@
 #include "basis_tables.h"
 #include "frames_to_tracks.h"
 #include "shapes.h"
+#include "surface_response.h"
 
 using namespace rill::cooker;
 
@@ -148,4 +149,72 @@ TEST_CASE("ends of lives that are coded off the surface are cut, and no others")
     CHECK(lives(3, 2, samples - 1));  // goes on in the next window
     for (uint32_t i = 0; i < 3; ++i)
         for (const glm::vec3& x : coded.decoded[first + i].position) CHECK(window.frames[0]->index.within(x, 1.5f * goal.tolerance));
+}
+
+TEST_CASE("what a point does to the decoded surface is known to first order") {
+    Window window = standing_ball();
+    const SurfaceFrame& frame = *window.frames[0];
+    const WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    std::vector<SurfacePoint> points;
+    for (const Path& path : window.paths)
+        if (path.alive(0)) points.push_back(path.target(0));
+    const SurfaceResponse surface(frame, points, 3 * goal.tolerance);
+    std::vector<Response> does;
+    std::vector<uint32_t> slots;
+    double all = 0, missed = 0;  // squares of what changes, and of what that is not as told
+    const auto try_move = [&](uint32_t i, const glm::vec3& move) {
+        std::vector<SurfacePoint> moved = points;
+        const TangentFrame tangents = surface.tangents[i];
+        moved[i].position += move.x * points[i].normal;
+        moved[i].normal = glm::normalize(points[i].normal + move.y * tangents.t1 + move.z * tangents.t2);
+        const std::vector<float> after = measure_residual(frame, moved).distance;
+        std::vector<float> told(after.size(), 0.f);
+        surface.of(i, does, slots);
+        for (const Response& r : does) told[r.vertex] = glm::dot(r.by, move);
+        for (size_t v = 0; v < after.size(); ++v) {
+            if (surface.area[v] == 0) continue;
+            const double change = double(after[v]) - double(surface.residual[v]);
+            all += change * change, missed += (change - told[v]) * (change - told[v]);
+        }
+    };
+    const float small = 0.05f;  // edges; radians
+    for (const glm::vec3& move : {glm::vec3(small * frame.edge, 0, 0), glm::vec3(0, small, 0), glm::vec3(0, 0, small)}) {
+        all = missed = 0;
+        for (uint32_t i = 0; i < points.size(); i += 5) try_move(i, move);
+        INFO("share missed: " << missed / all);
+        CHECK(missed < 0.1 * all);
+    }
+}
+
+TEST_CASE("coefficients chosen anew make up for each other, the same for any number of threads") {
+    Window window = standing_ball();
+    WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    const CodedWindow coded = code_tracks(window, goal, tables());
+    const auto error = [&](const CodedWindow& of) {
+        double sum = 0;
+        for (int s = 0; s < samples; ++s) {
+            const Residual residual = measure_residual(*window.frames[size_t(s)], decoded_points(of.decoded, s));
+            for (size_t v = 0; v < residual.distance.size(); ++v)
+                sum += double(window.frames[size_t(s)]->area[v]) * std::min(double(residual.distance[v] * residual.distance[v]), 1.0);
+        }
+        return sum;
+    };
+    // Every fifth track two steps too high.
+    CodedWindow spoilt = coded;
+    for (size_t i = 0; i < spoilt.tracks.size(); i += 5) {
+        spoilt.tracks[i].position[2] += 2;
+        spoilt.decoded[i] = dequantise_track(spoilt.tracks[i], spoilt.quantiser, goal.origin, tables());
+    }
+    CodedWindow refitted = spoilt, again = spoilt;
+    refit_tracks(window, refitted, goal, tables());
+    CHECK(error(spoilt) > 1.5 * error(coded));
+    CHECK(error(refitted) < 1.25 * error(coded));
+    goal.jobs = 1;
+    refit_tracks(window, again, goal, tables());
+    for (size_t i = 0; i < refitted.tracks.size(); ++i) {
+        CHECK(refitted.tracks[i].position == again.tracks[i].position);
+        CHECK(refitted.tracks[i].second == again.tracks[i].second);
+    }
 }
