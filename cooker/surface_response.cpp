@@ -12,8 +12,6 @@ namespace rill::cooker {
 namespace {
 
 constexpr float least_share = 0.01f;
-// As in the decoder's fit (surface/field_kernels_fit.h): what differs is only told less well, for what is decoded is measured.
-constexpr float support_scale = 1.4f, fit_reach = 1.15f, most_bend = 1.8f, ridge = 1e-3f;
 
 /// One patch's fit of a quadratic through its neighbours.
 struct PatchFit {
@@ -34,13 +32,13 @@ struct PatchFit {
     }
     void solve(double support) {
         const double trace = equations_[0][0] + equations_[1][1] + equations_[2][2];
-        for (int a = 0; a < 3; ++a) equations_[a][a] += ridge * trace;
+        for (int a = 0; a < 3; ++a) equations_[a][a] += surface::ridge * trace;
         inverse = trace > 0 && glm::determinant(equations_) > 0 ? glm::inverse(equations_) : glm::dmat3(0.0);
         glm::dvec3 q(0);
         for (const Neighbour& n : neighbours) q += by(n) * n.height;
         const double middle = 0.5 * (q.x + q.z), half = 0.5 * (q.x - q.z);
         const double bend = (std::abs(middle) + std::sqrt(half * half + 0.25 * q.y * q.y)) * support;
-        if (bend > most_bend) inverse *= most_bend / bend;
+        if (bend > surface::most_bend) inverse *= surface::most_bend / bend;
     }
     /// The quadratic per metre of a neighbour's height.
     glm::dvec3 by(const Neighbour& n) const { return inverse * n.row * (-scale_ * scale_); }
@@ -126,7 +124,7 @@ void SurfaceResponse::find_bends(const std::vector<SurfacePoint>& points, const 
         if (last2 == 0) return;
         const uint32_t own = field.source[i];
         const SurfacePoint& centre = points[own];
-        fit.begin(fit_reach * std::sqrt(last2), support_scale / field.support[i]);
+        fit.begin(surface::fit_reach * std::sqrt(last2), surface::support_scale / field.support[i]);
         for (uint32_t k = 0; k < surface::most_neighbours; ++k) {
             if (!there(k)) continue;
             const uint32_t other = field.source[near.id[k][lane]];

@@ -11,10 +11,10 @@
 #include <cmath>
 
 #include "surface/field_kernels_search.h"
+#include "surface/field_rules.h"
 
 namespace rill::surface::inner {
 
-constexpr float support_scale = 1.4f;  // R, of the distance to the neighbour of that number
 constexpr float same_side = 0.3f;      // least n·n of a row
 constexpr float most_alone = 1.8f;     // support relative to that of the points of either side
 constexpr float most_apart = 2.2f;     // likewise to the distance of the 2nd nearest point: two or three points of a bubble
@@ -22,8 +22,6 @@ constexpr float most_apart = 2.2f;     // likewise to the distance of the 2nd ne
                                        // edges into solid liquid, and it takes 2.8 % more bytes at equal p99; 1.8 −1.4 %, but
                                        // then a smooth surface of few points stays a quarter above its target.)
 constexpr float most_area = 0.3f;      // of the squared distance to the 6th neighbour of either side, over π
-constexpr float most_bend = 1.8f;      // |curvature|·R at most: a patch never curls over
-constexpr float ridge = 1e-3f;         // of the normalised normal equations: minimal norm when degenerate
 
 /// Inserts a key into row `here` of each lane, and leaves there what drops out. Of equals the first come stays first.
 RILL_INLINE void insert(float* row, uint32_t* id, float* key, uint32_t* name) {
@@ -181,7 +179,7 @@ RILL_INLINE void fit(Field& f, uint32_t from, uint32_t to, const Nearest& near) 
         area[l] = 0.25f * lesser(even, around2 < near.beyond ? most_area * around2 : unsupported) * active;
         const bool some = (count[l] >= 1) & (spacing[l] > least);
         scale[l] = some ? 1 / spacing[l] : 0.f;
-        inverse_reach[l] = some ? 1 / (1.15f * std::sqrt(last2[l])) : 0.f;
+        inverse_reach[l] = some ? 1 / (fit_reach * std::sqrt(last2[l])) : 0.f;
         // Any two unit tangents (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
         const float nx = f.nx[first + l], ny = f.ny[first + l], nz = f.nz[first + l];
         const float sign = nz >= 0 ? 1.f : -1.f, a = -1 / (sign + nz), b = nx * ny * a;

@@ -37,6 +37,11 @@ constexpr float soften = 0.03f;         // of u² in the weight: how far the ble
 // liquid has none: normals with half or a bit more of it are 13 % nearer to the source's than with all of it, with none
 // 10 % farther. Steps to the surface do not mind.
 constexpr float ripple = 0.65f;
+// The fit of a patch (field_kernels_fit.h).
+constexpr float support_scale = 1.4f;   // R, of the distance to the sixth neighbour
+constexpr float fit_reach = 1.15f;      // of its neighbours' weights, of the distance to the last
+constexpr float most_bend = 1.8f;       // |curvature|·R at most: a patch never curls over
+constexpr float ridge = 1e-3f;          // of the normalised normal equations: minimal norm when degenerate
 // Of radius²: bundles of points, and groups of them, farther than this count as one disc. (At 3 a violent splash loses
 // 1 % of its p99.)
 constexpr float from_afar = 4;
