@@ -30,6 +30,7 @@ nlohmann::json decisive_settings(const CookSettings& settings) {
     nlohmann::json all = {{"window", settings.window}, {"layers", settings.layers}, {"read", read_settings(settings.read)}};
     if (settings.bitrate > 0) all["bitrate"] = settings.bitrate;
     else all["error"] = settings.error;
+    if (!settings.slip) all["slip"] = false;
     return all;
 }
 

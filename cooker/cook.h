@@ -19,6 +19,7 @@ struct CookSettings {
     int window = 24;               ///< frames a window spans (it touches one more)
     int jobs = 0;                  ///< 0: all cores
     int layers = 4;
+    bool slip = true;              ///< keep how the liquid slides along the surface; false: the runtime's velocities are the surface's own
     ReadOptions read;
     // Below: how the work is done; none of it changes a byte of the asset.
     uint32_t segment = 0, segments = 0;  ///< segments > 0: cook only share `segment` (from 0) into a part

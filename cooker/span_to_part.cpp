@@ -99,10 +99,10 @@ bool go_with_liquid(Window& window, int jobs) {
     return true;
 }
 
-/// How points go from frame to frame. `known`: the velocities are the liquid's own.
-void find_motion(Window& window, Past past, bool known, int jobs) {
+/// How points go from frame to frame. `known`: the velocities are the liquid's own; `slip`: it is kept.
+void find_motion(Window& window, Past past, bool known, bool slip, int jobs) {
     if (known && go_with_liquid(window, jobs)) return;
-    window.slips = known;
+    window.slips = known && slip;
     for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
         const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
         const double seconds = window.seconds[s + 1] - window.seconds[s];
@@ -220,7 +220,7 @@ Window SpanCook::load(uint32_t first, uint32_t last, Past past, float tolerance)
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });
-    find_motion(window, std::move(past), !reader_.info().velocity_estimated, settings_.jobs);
+    find_motion(window, std::move(past), !reader_.info().velocity_estimated, settings_.slip, settings_.jobs);
     return window;
 }
 

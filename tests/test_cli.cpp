@@ -142,6 +142,7 @@ TEST_CASE("cook: a recipe, over which the command line goes") {
     refused(R"({"depfile": "x"})", 1, "'depfile' is no setting");
     refused(R"({"error": "1e", "error": "2e"})", 1, "'error' stands there twice");
     refused(R"({"window": "6"})", 1, "'window' must be a number");
+    refused(R"({"slip": "no"})", 1, "'slip' must be true or false");
     refused(R"({"error": 6})", 1, "'error' must be a text");
     refused(R"({"window": 900})", 1, "--window");
     refused(R"({"version": 2})", 1, "version 2 is not known");
@@ -482,6 +483,25 @@ TEST_CASE("compare: Draco's size falls and its error grows with fewer bits") {
     const Result missing = run_rill("compare " + clip().input + " --asset " + clip().asset + " --frames 3:3 --decimator /nonexistent/tool");
     CHECK(missing.code == 2);
     CHECK(missing.text.find("/nonexistent/tool: ") != std::string::npos);
+}
+
+TEST_CASE("slip: kept unless told otherwise, and no part of what is compared without velocity") {
+    const TestFolder folder;
+    for (int number = 1; number <= 5; ++number) {  // a ball at rest whose liquid runs up its sides
+        Mesh ball = sphere(32, 0.5f);
+        for (const glm::vec3& x : ball.positions) ball.velocities.push_back(4.f * (glm::vec3(0, 0, 1) - 4 * x.z * x));
+        put_file(folder / "ball/f" + std::to_string(number) + ".ply", plain_ply(ball));
+    }
+    const auto compared = [&](const std::string& more) {
+        const std::string asset = folder / "ball.rill";
+        REQUIRE(run_rill("cook " + (folder / "ball") + " --quiet --force -o " + asset + more).code == 0);
+        REQUIRE(run_rill("compare " + (folder / "ball") + " --asset " + asset + " --frames 2:2 --quiet --json " + (folder / "c.json")).code == 0);
+        return json_of(folder / "c.json")["rill"];
+    };
+    const nlohmann::json kept = compared(""), left_out = compared(" --slip false");
+    CHECK(kept["bytes_without_slip_per_frame"].get<double>() < kept["bytes_per_frame"].get<double>());
+    CHECK(left_out["bytes_without_slip_per_frame"] == left_out["bytes_per_frame"]);
+    CHECK(left_out["p99_m"].get<double>() == doctest::Approx(kept["p99_m"].get<double>()).epsilon(0.1));
 }
 
 TEST_CASE("cook: warnings tell what is wrong and what to do about it") {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 
 #include "asset_player.h"
+#include "byte_account.h"
 #include "commands/commands.h"
 #include "cook.h"
 #include "rivals.h"
@@ -35,6 +37,7 @@ struct Own {
     Verification error;
     double decode_ms = 0;      ///< a frame, one core: reading, decoding, field and mesh, played in order
     double raw_bytes = 0;      ///< a frame of the source: 12 bytes a vertex and a triangle
+    double still_bytes = 0;    ///< a frame, without slip: that is velocity alone, which rivals are counted with and without
 };
 
 nlohmann::json to_json(const RatePoint& p, double raw_bytes) {
@@ -74,6 +77,22 @@ double raw_bytes_of(const Verification& own) {
     return own.frames.empty() ? 0 : sum / double(own.frames.size());
 }
 
+double still_bytes_of(const Verification& own) {
+    const ByteAccount account = account_for_bytes(read_directory(own.asset));
+    uint64_t slip = 0;
+    for (const LayerBytes& layer : account.layers) slip += layer.slip;
+    return own.bytes_per_frame * (1 - double(slip) / double(account.sum()));
+}
+
+/// A rival's bytes with and without velocity, and Rill's beside them.
+struct Count {
+    double RatePoint::*rival;
+    double own;
+};
+std::array<Count, 2> counts(const Own& own) {
+    return {{{&RatePoint::bytes_per_frame, own.still_bytes}, {&RatePoint::bytes_with_velocity, own.error.bytes_per_frame}}};
+}
+
 void print(const std::vector<RateCurve>& curves, const Own& own) {
     const double scale = own.error.diagonal > 0 ? 100 / own.error.diagonal : 0;
     std::printf("%-41s %-18s %11s %11s %8s %8s %8s %9s %8s\n", "method", "setting", "bytes/frame", "+ velocity", "raw : 1", "mean %", "p99 %",
@@ -86,16 +105,15 @@ void print(const std::vector<RateCurve>& curves, const Own& own) {
     for (const RateCurve& curve : curves)
         for (const RatePoint& p : curve.points)
             line(curve.method, p.setting, p.bytes_per_frame, p.bytes_with_velocity, p.mean, p.p99, p.normal_degrees, p.decode_ms);
-    const double bytes = own.error.bytes_per_frame;
-    line("Rill", own.error.target, bytes, bytes, own.error.mean, own.error.p99, own.error.normal_degrees, own.decode_ms);
+    line("Rill", own.error.target, own.still_bytes, own.error.bytes_per_frame, own.error.mean, own.error.p99, own.error.normal_degrees, own.decode_ms);
     std::printf("\n%-41s %27s   %27s\n%-41s %8s %8s %9s   %8s %8s %9s\n", "bytes over Rill's at equal …", "positions", "with velocity", "",
                 "mean", "p99", "normals", "mean", "p99", "normals");
     for (const RateCurve& curve : curves) {
         std::printf("%-41s", curve.method.c_str());
-        for (double RatePoint::*size : {&RatePoint::bytes_per_frame, &RatePoint::bytes_with_velocity}) {
+        for (const Count& count : counts(own)) {
             for (const Measure& m : measures) {
-                const double rival = curve.bytes_at(size, m.rival, own.error.*m.own);
-                if (rival > 0) std::printf(" %8.2f", rival / bytes);
+                const double rival = curve.bytes_at(count.rival, m.rival, own.error.*m.own);
+                if (rival > 0) std::printf(" %8.2f", rival / count.own);
                 else std::printf(" %8s", "-");
             }
             std::printf("    ");
@@ -106,22 +124,23 @@ void print(const std::vector<RateCurve>& curves, const Own& own) {
 
 nlohmann::json report_json(const std::vector<RateCurve>& curves, const Own& own, const SequenceReader& source) {
     const Verification& e = own.error;
-    nlohmann::json json = {{"report", "rill compare"}, {"version", 2}, {"input", e.input}, {"frames", source.info().numbers},
+    nlohmann::json json = {{"report", "rill compare"}, {"version", 3}, {"input", e.input}, {"frames", source.info().numbers},
                            {"raw_bytes_per_frame", own.raw_bytes}, {"rivals", nlohmann::json::array()}};
     for (const RateCurve& curve : curves) {
         nlohmann::json points = nlohmann::json::array(), still, moving;
         for (const RatePoint& p : curve.points) points.push_back(to_json(p, own.raw_bytes));
         for (const Measure& m : measures) {
-            const auto ratio = [&](double RatePoint::*bytes) {
-                const double rival = curve.bytes_at(bytes, m.rival, e.*m.own);
-                return rival > 0 ? nlohmann::json(rival / e.bytes_per_frame) : nlohmann::json();
+            const auto ratio = [&](const Count& count) {
+                const double rival = curve.bytes_at(count.rival, m.rival, e.*m.own);
+                return rival > 0 ? nlohmann::json(rival / count.own) : nlohmann::json();
             };
-            still[m.key] = ratio(&RatePoint::bytes_per_frame), moving[m.key] = ratio(&RatePoint::bytes_with_velocity);
+            const auto [without, with] = counts(own);
+            still[m.key] = ratio(without), moving[m.key] = ratio(with);
         }
         json["rivals"].push_back({{"method", curve.method}, {"points", points}, {"bytes_over_rill_at_equal", still},
                                   {"bytes_over_rill_at_equal_with_velocity", moving}});
     }
-    json["rill"] = {{"asset", e.asset}, {"bytes_per_frame", e.bytes_per_frame}, {"mean_m", e.mean}, {"p99_m", e.p99}, {"max_m", e.max},
+    json["rill"] = {{"asset", e.asset}, {"bytes_per_frame", e.bytes_per_frame}, {"bytes_without_slip_per_frame", own.still_bytes}, {"mean_m", e.mean}, {"p99_m", e.p99}, {"max_m", e.max},
                     {"normal_degrees", e.normal_degrees}, {"diagonal_m", e.diagonal}, {"decode_ms", own.decode_ms},
                     {"raw_over_bytes", e.bytes_per_frame > 0 ? own.raw_bytes / e.bytes_per_frame : 0}};
     return json;
@@ -151,7 +170,7 @@ int compare_command(const CompareOptions& options) {
         Progress progress("Rill", options.quiet);
         own.error = verify(asset, *source, options.jobs, [&](uint32_t done, uint32_t total) { progress("", done, total); });
     }
-    own.decode_ms = decode_time(own.error), own.raw_bytes = raw_bytes_of(own.error);
+    own.decode_ms = decode_time(own.error), own.raw_bytes = raw_bytes_of(own.error), own.still_bytes = still_bytes_of(own.error);
     std::vector<RateCurve> curves;
     {
         Progress progress("rivals", options.quiet);

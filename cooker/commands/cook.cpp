@@ -125,6 +125,7 @@ void add_cook(CLI::App& app, Run& run) {
     command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive");
     command->add_option("--window", options->settings.window, "Frames per window")->check(CLI::Range(1, 64))->capture_default_str();
     command->add_option("--layers", options->settings.layers, "Layers of detail")->check(CLI::Range(1, 8))->capture_default_str();
+    command->add_option("--slip", options->settings.slip, "Keep how the liquid slides along the surface, for velocity; false: a few per cent smaller")->capture_default_str();
     command->add_option("--jobs", options->settings.jobs, "Threads; 0: all cores")->check(CLI::Range(0, 1024));
     command->add_option("--recipe", options->recipe, "JSON file of these settings (see RECIPES.md); the command line goes before it");
     command->add_option("--report", options->report, "Write the report as JSON; - is standard output");

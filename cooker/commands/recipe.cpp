@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-enum class Kind { text, number, path };
+enum class Kind { text, number, path, truth };
 struct Key {
     const char *name, *option;
     Kind kind;
@@ -21,7 +21,7 @@ struct Key {
 constexpr Key keys[] = {
     {"input", "INPUT", Kind::path}, {"output", "--output", Kind::path}, {"error", "--error", Kind::text}, {"bitrate", "--bitrate", Kind::number},
     {"frames", "--frames", Kind::text}, {"fps", "--fps", Kind::number}, {"window", "--window", Kind::number},
-    {"layers", "--layers", Kind::number}, {"jobs", "--jobs", Kind::number}, {"velocity", "--velocity", Kind::text},
+    {"layers", "--layers", Kind::number}, {"slip", "--slip", Kind::truth}, {"jobs", "--jobs", Kind::number}, {"velocity", "--velocity", Kind::text},
     {"velocity-unit", "--velocity-unit", Kind::text}, {"up", "--up", Kind::text}, {"handedness", "--handedness", Kind::text},
     {"scale", "--scale", Kind::number},
 };
@@ -88,8 +88,8 @@ std::map<std::string, double> apply_recipe(const std::string& path, CLI::App& co
             for (const Key& k : keys) known += std::string(" ") + k.name;
             throw UsageError(path + ": '" + name + "' is no setting of a recipe; there are version targets" + known);
         }
-        if (key->kind == Kind::number ? !value.is_number() : !value.is_string())
-            throw UsageError(path + ": '" + name + "' must be a " + (key->kind == Kind::number ? "number" : "text"));
+        const bool fits = key->kind == Kind::number ? value.is_number() : key->kind == Kind::truth ? value.is_boolean() : value.is_string();
+        if (!fits) throw UsageError(path + ": '" + name + "' must be " + (key->kind == Kind::number ? "a number" : key->kind == Kind::truth ? "true or false" : "a text"));
         if (aimed && (name == "error" || name == "bitrate")) continue;
         std::string text = value.is_string() ? value.get<std::string>() : value.dump();
         if (key->kind == Kind::path) text = (fs::path(path).parent_path() / text).string();  // as it is when absolute
