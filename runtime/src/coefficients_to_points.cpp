@@ -74,6 +74,12 @@ TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint3
     return rows;
 }
 
+uint32_t count_active(const TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last) noexcept {
+    uint32_t active = 0;
+    for (uint32_t i = first; i < last; ++i) active += activity_at(block.tracks[i], rows->s) > 0;
+    return active;
+}
+
 uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last,
                          uint32_t point_capacity, uint32_t drop_capacity, format::PointSet& points,
                          format::DropSet& drops) noexcept {

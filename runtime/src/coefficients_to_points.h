@@ -17,7 +17,9 @@ size_t time_rows_bytes(uint32_t sample_count) noexcept;
 TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count,
                           double s, double samples_per_second) noexcept;
 
-/// Appends the tracks [first, last) of the block that are active at the rows' time to points/drops.
+/// How many of the tracks [first, last) of the block are active at the rows' time.
+uint32_t count_active(const TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last) noexcept;
+/// Appends those of them that are active, and sound, to points/drops.
 /// `capacity`: of each set. Returns how many were active (appended + those that did not fit).
 uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, uint32_t first,
                          uint32_t last, uint32_t point_capacity, uint32_t drop_capacity,
