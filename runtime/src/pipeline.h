@@ -224,7 +224,7 @@ struct Piece {
 inline constexpr uint32_t piece_tracks = 1024;
 struct Evaluation {
     void* rows_memory;
-    const TimeRows* rows;
+    TimeRows* rows;
     Piece* pieces;                 ///< (layer, block, first) ascending: what makes the order of points
     uint32_t piece_count;
     format::PointSet points;

@@ -134,7 +134,8 @@ RILL_INLINE uint32_t find_doubts(const Opinions& of, float trusted_value, Batch&
         const float size = b.value[l] < 0 ? -b.value[l] : b.value[l], u2 = b.u2[l], all = of.all[l], sum = of.sum[l];
         const float variance = madd<fused>(of.square[l], all, -sum * sum) * of.inverse[l];  // all² times, in R²
         const float split = against[l] * variance > most[l] * (all * all * all) ? u2 : 0.f;
-        const float unsure = of.voters[l] < enough_voters ? u2 : split, asked = size > trusted_value ? unsure : 0.f;
+        const float needed = greater(greater(against[l], -b.value[l]), u2 - core) > 0 ? enough_voters : 0.f;
+        const float unsure = of.voters[l] < needed ? u2 : split, asked = size > trusted_value ? unsure : 0.f;
         const float doubted = b.sign[l] == 0 ? unsupported : asked;
         b.u2[l] = b.sign[l] == 0 ? unsupported : u2, doubt[l] = doubted > trusted ? bit_of_lane[l] : 0u;
     }
