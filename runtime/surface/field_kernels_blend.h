@@ -189,8 +189,10 @@ RILL_INLINE uint32_t confirm_doubts(const Field& f, const uint32_t* list, uint32
     }
     alignas(64) uint32_t kept[lanes];
     for (uint32_t l = 0; l < lanes; ++l) {
-        const bool wrong = b.value[l] < 0 ? turn[l] < liquid_around : turn[l] > air_around;
-        kept[l] = (b.u2[l] > core) | wrong ? bit_of_lane[l] : 0u;
+        // Nothing in reach turns nothing: is asked.
+        const float liquid = b.u2[l] > core ? unsupported : liquid_around, air = b.u2[l] > core ? air_around_far : air_around;
+        const float wrong = b.value[l] < 0 ? liquid - turn[l] : turn[l] - air;
+        kept[l] = wrong > 0 ? bit_of_lane[l] : 0u;
     }
     return doubts & word_of(kept);
 }
