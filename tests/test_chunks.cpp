@@ -361,8 +361,11 @@ TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact veloc
         for (int i = 0; i < 10; ++i) *streams[i] = memory.data() + 4 * i;
         points.count = 0;
         format::DropSet drops{};
-        return evaluate_tracks(place_time_rows(rows_memory.data(), tables(), window, s, 24), d.block, 0, 4,
-                               capacity, 0, points, drops);
+        TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, 24);
+        const uint32_t counted = count_active(rows, d.block, 0, 4);
+        const uint32_t active = evaluate_tracks(rows, d.block, 0, 4, capacity, 0, points, drops);
+        CHECK(counted == active);
+        return active;
     };
     format::PointSet points{};
     for (int s = 0; s < int(window); ++s) {

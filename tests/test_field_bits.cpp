@@ -44,7 +44,7 @@ TEST_CASE("at the surface the blend stands; where it is far from zero it is aske
     const RealField real(cloud);
     Random random(13);
     size_t doubted = 0;
-    for (int i = 0; i < 3000; ++i) {
+    for (int i = 0; i < 8000; ++i) {
         const float x = float(3 * random() - 1.5), y = float(3 * random() - 1.5), z = float(1.4 * random() - 0.7);
         const auto candidates = candidates_of(real.field, {{x, y, z}, {x, y, z}});
         const auto count = uint32_t(candidates.size());

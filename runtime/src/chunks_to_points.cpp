@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Resident chunks at a moment → points and drops. Two rounds of tasks: the first counts who is alive, so
-// that the second may write to fixed places. The order of points is that of the pieces, whoever runs them.
+// Resident chunks at a moment → points and drops. Who is alive is counted first, so that tasks may write to
+// fixed places. The order of points is that of the pieces, whoever runs them.
 #include <algorithm>
 
 #include "pipeline.h"
@@ -10,62 +10,54 @@ namespace {
 
 void add_pieces(Evaluation& e, uint32_t chunk, uint32_t first, uint32_t last) {
     for (; first < last; first += std::min(piece_tracks, last - first))
-        e.pieces[e.piece_count++] = {chunk, first, first + std::min(piece_tracks, last - first), 0, 0, 0};
+        e.pieces[e.piece_count++] = {chunk, first, first + std::min(piece_tracks, last - first), 0, 0};
 }
 
 const format::TrackBlock& block_of(const Player& player, const Piece& piece) {
     return *player.residency.chunks[piece.chunk].block;
 }
 
-uint32_t prepare_count(void* context) {
-    auto& player = *static_cast<Player*>(context);
-    Evaluation& e = player.evaluation;
-    const Plan& plan = player.plan;
-    const Moment& moment = plan.moment;
-    const uint32_t samples = player.directory->tables.windows[moment.window].sample_count;
-    e.rows = place_time_rows(e.rows_memory, player.directory->basis, samples, moment.sample,
-                             moment.samples_per_second);
+void list_pieces(const Player& player, Evaluation& e) {
     e.piece_count = 0;
-    for (uint32_t i = 0; i < plan.now_count; ++i) {
-        const uint32_t chunk = plan.wants[i].chunk;
+    for (uint32_t i = 0; i < player.plan.now_count; ++i) {
+        const uint32_t chunk = player.plan.wants[i].chunk;
         if (player.residency.chunks[chunk].state != ChunkState::resident) continue;
         const format::TrackBlock& block = *player.residency.chunks[chunk].block;
         add_pieces(e, chunk, 0, block.point_count);
         add_pieces(e, chunk, block.point_count, block.point_count + block.drop_count);
     }
-    return e.piece_count;
-}
-
-void run_count(void* context, uint32_t index, uint32_t) {
-    auto& player = *static_cast<Player*>(context);
-    Evaluation& e = player.evaluation;
-    Piece& piece = e.pieces[index];
-    format::PointSet no_points{};
-    format::DropSet no_drops{};
-    piece.active = evaluate_tracks(e.rows, block_of(player, piece), piece.first, piece.last, 0, 0, no_points,
-                                   no_drops);
 }
 
 /// Coarse layers get their places first; what no longer fits is left out and reported.
-uint32_t prepare_evaluate(void* context) {
-    auto& player = *static_cast<Player*>(context);
-    Evaluation& e = player.evaluation;
+void lay_out_pieces(const Player& player, Evaluation& e) {
     uint32_t left = player.limits.points;
     if (player.frame.budget.points) left = std::min(left, player.frame.budget.points);
     e.points.count = e.drops.count = e.points_wanted = 0;
     e.cut = false;
     for (uint32_t i = 0; i < e.piece_count; ++i) {
         Piece& piece = e.pieces[i];
-        const bool drops = piece.first >= block_of(player, piece).point_count;
+        const format::TrackBlock& block = block_of(player, piece);
+        const bool drops = piece.first >= block.point_count;
         uint32_t& count = drops ? e.drops.count : e.points.count;
         const uint32_t capacity = drops ? e.drop_capacity : e.point_capacity;
+        const uint32_t active = count_active(e.rows, block, piece.first, piece.last);
         piece.offset = count;
-        piece.room = std::min({piece.active, left, capacity - count});
-        e.cut = e.cut || piece.room < piece.active;
-        e.points_wanted += piece.active;
+        piece.room = std::min({active, left, capacity - count});
+        e.cut = e.cut || piece.room < active;
+        e.points_wanted += active;
         count += piece.room;
         left -= piece.room;
     }
+}
+
+uint32_t prepare_evaluate(void* context) {
+    auto& player = *static_cast<Player*>(context);
+    Evaluation& e = player.evaluation;
+    const Moment& moment = player.plan.moment;
+    const uint32_t samples = player.directory->tables.windows[moment.window].sample_count;
+    e.rows = place_time_rows(e.rows_memory, player.directory->basis, samples, moment.sample, moment.samples_per_second);
+    list_pieces(player, e);
+    lay_out_pieces(player, e);
     return e.piece_count;
 }
 
@@ -108,6 +100,13 @@ void cull_points(const Plan& plan, float margin, format::PointSet& points) {
     }
 }
 
+/// Places of tracks that turned out to be no points.
+void leave_out(format::PointSet& points, uint32_t room) {
+    for (uint32_t i = points.count; i < room; ++i)
+        for (float* row : {points.x, points.y, points.z, points.nx, points.ny, points.nz, points.vx, points.vy, points.vz, points.activity}) row[i] = 0;
+    points.count = room;
+}
+
 void run_evaluate(void* context, uint32_t index, uint32_t) {
     auto& player = *static_cast<Player*>(context);
     Evaluation& e = player.evaluation;
@@ -119,9 +118,11 @@ void run_evaluate(void* context, uint32_t index, uint32_t) {
     if (piece.first >= block.point_count) {
         drops = slice(e.drops, piece.offset);
         evaluate_tracks(e.rows, block, piece.first, piece.last, 0, piece.room, points, drops);
+        for (uint32_t i = drops.count; i < piece.room; ++i) drops.activity[i] = 0;
     } else {
         points = slice(e.points, piece.offset);
         evaluate_tracks(e.rows, block, piece.first, piece.last, piece.room, 0, points, drops);
+        leave_out(points, piece.room);
         const format::ChunkRecord& record = player.directory->tables.chunks[piece.chunk];
         cull_points(player.plan, (reach_in_spacings + 1) * record.spacing, points);
         hand_out_points(e.points, piece.offset, piece.offset + piece.room, *player.frame.target);
@@ -131,7 +132,6 @@ void run_evaluate(void* context, uint32_t index, uint32_t) {
 }  // namespace
 
 const Stage evaluate_stages[evaluate_stage_count] = {
-    {prepare_count, run_count, false},
     {prepare_evaluate, run_evaluate, false},
 };
 

@@ -2,15 +2,17 @@
 #include "src/coefficients_to_points.h"
 
 #include <cmath>
+#include <cstring>
 #include <new>
 
 #include "format/layout.h"
 
 namespace rill {
 
-/// Behind it: for every life [birth, death] that is active at s, and both bases, one row of values and one
-/// of derivatives.
+/// Behind it: for every life [birth, death] and both bases one row of values and one of derivatives, once a track needs them;
+/// and whether they have been made.
 struct TimeRows {
+    format::BasisTables tables;
     uint32_t samples, stride;  ///< stride: floats in a row
     double s;
     float samples_per_second;
@@ -24,12 +26,28 @@ uint32_t row_stride(uint32_t samples) {
     const uint32_t terms = samples < format::max_terms ? samples : format::max_terms;
     return (terms + 3) / 4 * 4;
 }
-size_t header_bytes() { return (sizeof(TimeRows) + alignment - 1) / alignment * alignment; }
+size_t aligned(size_t bytes) { return (bytes + alignment - 1) / alignment * alignment; }
+size_t rows_in(uint32_t samples) { return size_t(samples) * (samples + 1); }
 
-float* rows_of(const TimeRows* rows, uint32_t birth, uint32_t death, bool cosine) {
-    const uint32_t life = birth * rows->samples - birth * (birth - 1) / 2 + (death - birth);  // of a triangle
-    auto* floats = reinterpret_cast<float*>(reinterpret_cast<uintptr_t>(rows) + header_bytes());
-    return floats + size_t(life * 2 + cosine) * 2 * rows->stride;
+/// Of a track's life and basis: its place in a triangle.
+uint32_t row_of(const TimeRows& rows, const format::Track& track) {
+    const uint32_t birth = track.birth, life = birth * rows.samples - birth * (birth - 1) / 2 + (track.death - birth);
+    return life * 2 + ((track.flags & format::track_cosine) != 0);
+}
+uint8_t* made_of(const TimeRows* rows) {
+    return reinterpret_cast<uint8_t*>(reinterpret_cast<uintptr_t>(rows) + aligned(sizeof(TimeRows)));
+}
+float* floats_of(const TimeRows* rows, uint32_t row) {
+    return reinterpret_cast<float*>(made_of(rows) + aligned(rows_in(rows->samples))) + size_t(row) * 2 * rows->stride;
+}
+
+void make_row(const TimeRows* rows, const format::Track& track) {
+    const uint32_t row = row_of(*rows, track), life = track.death - track.birth + 1u;
+    if (made_of(rows)[row]) return;
+    made_of(rows)[row] = 1;
+    const bool cosine = (track.flags & format::track_cosine) != 0;
+    float* out = floats_of(rows, row);
+    format::basis_row(rows->tables, life, cosine, rows->s - track.birth, format::most_terms(life, cosine), out, out + rows->stride);
 }
 
 /// 0: absent.
@@ -54,24 +72,25 @@ void combine(const float* coefficients, const float* row, uint32_t terms, float*
 }  // namespace
 
 size_t time_rows_bytes(uint32_t sample_count) noexcept {
-    const size_t lives = size_t(sample_count) * (sample_count + 1) / 2;
-    return header_bytes() + lives * 4 * row_stride(sample_count) * sizeof(float);
+    const size_t rows = rows_in(sample_count);
+    return aligned(sizeof(TimeRows)) + aligned(rows) + rows * 2 * row_stride(sample_count) * sizeof(float);
 }
 
 TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count, double s,
                           double samples_per_second) noexcept {
-    auto* rows = new (memory) TimeRows{sample_count, row_stride(sample_count), s, float(samples_per_second)};
-    for (uint32_t birth = 0; birth < sample_count && birth < s + 1; ++birth)
-        for (uint32_t death = birth; death < sample_count; ++death) {
-            if (death + 1 <= s) continue;
-            const uint32_t life = death - birth + 1;
-            for (int cosine = 0; cosine < 2; ++cosine) {
-                float* row = rows_of(rows, birth, death, cosine);
-                format::basis_row(tables, life, cosine, s - birth, format::most_terms(life, cosine), row,
-                                  row + rows->stride);
-            }
-        }
+    auto* rows = new (memory) TimeRows{tables, sample_count, row_stride(sample_count), s, float(samples_per_second)};
+    std::memset(made_of(rows), 0, rows_in(sample_count));
     return rows;
+}
+
+uint32_t count_active(TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last) noexcept {
+    uint32_t active = 0;
+    for (uint32_t i = first; i < last; ++i) {
+        if (!(activity_at(block.tracks[i], rows->s) > 0)) continue;
+        make_row(rows, block.tracks[i]);
+        ++active;
+    }
+    return active;
 }
 
 uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last,
@@ -82,7 +101,7 @@ uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, 
         const format::Track& track = block.tracks[i];
         const float activity = activity_at(track, rows->s);
         if (!(activity > 0)) continue;
-        const float* row = rows_of(rows, track.birth, track.death, (track.flags & format::track_cosine) != 0);
+        const float* row = floats_of(rows, row_of(*rows, track));
         const float* coefficients = block.coefficients + track.first_coefficient;
         const float* second = coefficients + 3 * track.position_terms;
         float x[3], v[3];

@@ -219,13 +219,12 @@ void release_chunk(Residency& residency, uint32_t chunk) noexcept;
 /// Up to 1024 tracks of one chunk, all points or all drops: the unit of work.
 struct Piece {
     uint32_t chunk, first, last;
-    uint32_t active;               ///< counted
     uint32_t offset, room;         ///< its slice of the output
 };
 inline constexpr uint32_t piece_tracks = 1024;
 struct Evaluation {
     void* rows_memory;
-    const TimeRows* rows;
+    TimeRows* rows;
     Piece* pieces;                 ///< (layer, block, first) ascending: what makes the order of points
     uint32_t piece_count;
     format::PointSet points;
@@ -234,7 +233,7 @@ struct Evaluation {
     uint32_t points_wanted;        ///< points and drops active in the chunks drawn
     bool cut;
 };
-inline constexpr uint32_t evaluate_stage_count = 2;
+inline constexpr uint32_t evaluate_stage_count = 1;
 extern const Stage evaluate_stages[evaluate_stage_count];  ///< context Player
 
 // ---- plan, time there is → detail -----------------------------------------------------------------

@@ -40,7 +40,7 @@ struct alignas(64) Patch {
     float xx, yy, zz, xy, xz, yz;  ///< of Q; the mixed ones doubled
     float inverse;                 ///< 1 / R²
     float activity, recede;        ///< and 1 / activity: a point that fades recedes
-    float unused;
+    float area;                    ///< as Field::area
 };
 
 /// All memory is the caller's: one block of field_bytes(), 64-byte aligned.

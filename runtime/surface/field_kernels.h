@@ -26,12 +26,11 @@ struct alignas(64) Slopes {
     float gx[lanes], gy[lanes], gz[lanes], vx[lanes], vy[lanes], vz[lanes];
 };
 
-/// The nearest neighbours of sixteen points that face the same way, nearest first, and those of either side: squared
-/// distances, `beyond` for none.
+/// The nearest neighbours of sixteen points that face the same way, nearest first, and the distances of those of either
+/// side: squared, `beyond` and more for none.
 struct alignas(64) Nearest {
     float d2[most_neighbours][lanes], any[support_neighbour][lanes];
     uint32_t id[most_neighbours][lanes];
-    uint32_t any_id[support_neighbour][lanes];  ///< not read: without it compilers insert lane by lane
     float beyond;
 };
 

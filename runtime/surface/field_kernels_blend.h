@@ -5,7 +5,7 @@
 
 #include "surface/bits.h"
 #include "surface/field.h"
-#include "surface/field_kernels_lanes.h"
+#include "surface/field_kernels_search.h"
 #include "surface/field_rules.h"
 
 namespace rill::surface::inner {
@@ -40,7 +40,7 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
 /// Squared distance and place in a block of a list in one word: the least word is that of the nearest, and the first of
 /// equals. What the place takes away is less than 1e-5 of the distance. (In three words: frames 5 to 8 % slower.)
 // Signed, for most machines compare no other words.
-constexpr int32_t block = 32, place_bits = block - 1, no_word = 0x7fffffff, distance_bits = no_word & ~place_bits;
+constexpr int32_t block = 32, place_bits = block - 1, distance_bits = no_word & ~place_bits;
 
 /// What a block of patches is to each position: bits of those that have weight there, the word of the nearest among them,
 /// and the least u² of any.
@@ -134,7 +134,8 @@ RILL_INLINE uint32_t find_doubts(const Opinions& of, float trusted_value, Batch&
         const float size = b.value[l] < 0 ? -b.value[l] : b.value[l], u2 = b.u2[l], all = of.all[l], sum = of.sum[l];
         const float variance = madd<fused>(of.square[l], all, -sum * sum) * of.inverse[l];  // all² times, in R²
         const float split = against[l] * variance > most[l] * (all * all * all) ? u2 : 0.f;
-        const float unsure = of.voters[l] < enough_voters ? u2 : split, asked = size > trusted_value ? unsure : 0.f;
+        const float needed = greater(greater(against[l], -b.value[l]), u2 - core) > 0 ? enough_voters : 0.f;
+        const float unsure = of.voters[l] < needed ? u2 : split, asked = size > trusted_value ? unsure : 0.f;
         const float doubted = b.sign[l] == 0 ? unsupported : asked;
         b.u2[l] = b.sign[l] == 0 ? unsupported : u2, doubt[l] = doubted > trusted ? bit_of_lane[l] : 0u;
     }
@@ -172,6 +173,30 @@ RILL_INLINE void sum_up(const Field& f, const uint32_t* list, uint32_t count, co
         for (uint32_t l = 0; l < lanes; ++l) to[k][l] = sums[k][l];
 }
 
+/// Of the doubts, those that the winding number may confirm: the solid angle of the patches with weight is most of what it
+/// changes by across the surface, and costs a fraction of it.
+template <bool fused>
+RILL_INLINE uint32_t confirm_doubts(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, uint32_t doubts) {
+    alignas(64) float turn[lanes] = {};
+    for (uint32_t c = 0; c < count; ++c) {
+        const Patch p = f.patches[list[c]];
+        for (uint32_t l = 0; l < lanes; ++l) {
+            const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
+            const float h = dot<fused>(p.nx, p.ny, p.nz, rx, ry, rz), d2 = dot<fused>(rx, ry, rz, rx, ry, rz);
+            const float seen = madd<fused>(flatten * h, h, d2) * p.inverse < 1 ? p.area * h : 0.f;
+            turn[l] = madd<fused>(-seen, inverse_cube_root_squared<fused>(d2 + 1e-20f), turn[l]);
+        }
+    }
+    alignas(64) uint32_t kept[lanes];
+    for (uint32_t l = 0; l < lanes; ++l) {
+        // Nothing in reach turns nothing: is asked.
+        const float liquid = b.u2[l] > core ? unsupported : liquid_around, air = b.u2[l] > core ? air_around_far : air_around;
+        const float wrong = b.value[l] < 0 ? liquid - turn[l] : turn[l] - air;
+        kept[l] = wrong > 0 ? bit_of_lane[l] : 0u;
+    }
+    return doubts & word_of(kept);
+}
+
 template <bool fused>
 RILL_INLINE uint32_t blend(const Field& f, const uint32_t* candidates, uint32_t candidate_count, uint32_t* list, uint32_t& listed,
                            float trusted_value, Batch& b) {
@@ -195,7 +220,8 @@ RILL_INLINE uint32_t blend(const Field& f, const uint32_t* candidates, uint32_t 
     for (uint32_t l = 0; l < lanes; ++l) b.value[l] = take[l] > 0 ? value_b[l] : value_a[l];
     for (uint32_t l = 0; l < lanes; ++l) b.weight[l] = take[l] > 0 ? sums.weight_b[l] : sums.weight_a[l];
     for (uint32_t l = 0; l < lanes; ++l) b.sign[l] = take[l] > 0 ? -1.f : sums.weight_a[l] > 0 ? 1.f : 0.f;
-    return find_doubts<fused>({sums.all, sums.sum, sums.square, sums.inside, sums.voters, inverse}, trusted_value, b);
+    const uint32_t doubts = find_doubts<fused>({sums.all, sums.sum, sums.square, sums.inside, sums.voters, inverse}, trusted_value, b);
+    return doubts ? confirm_doubts<fused>(f, list, count, b, doubts) : 0;
 }
 
 /// Of the chosen cluster: Σ w ∇G + ripple (G − value) ∇w, and Σ w v.

@@ -45,6 +45,8 @@ RILL_INLINE float float_of(int32_t bits) {
     return x;
 }
 
+constexpr int32_t no_word = 0x7fffffff;  // more than the bits of any number
+
 /// About 1 / x of a positive x, to 7e-6: a guess from the exponent and two Newton steps. A division takes as long as all
 /// the rest of a weight.
 template <bool fused>
