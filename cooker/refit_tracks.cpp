@@ -23,6 +23,10 @@ constexpr double bits_per_square = 2.5;      // what a squared error of one step
 constexpr double normals_count = 0.13;       // a normal that is one step off, against a distance of one step
 constexpr double rest = 0.05;                // of the mean pull of the surface: keeps a point where few vertices hold it
 constexpr int sweeps = 2;                    // over a track's coefficients
+// Tracks of different blocks have their turns at once: they rarely touch the same vertices, and where they do, each misses what
+// the other does. How many is not for the number of threads to say, or the outcome would be, too.
+constexpr size_t together = 32;
+constexpr uint32_t fewest_apart = 64;        // tracks of a block
 constexpr int32_t most_shift = 3;            // of a mean height, steps: first-order figures hold near where they are from
 
 /// How a sample of a track is held: half the gradient and half the Hessian of the error, by its offset along the normal
@@ -119,12 +123,21 @@ std::optional<QuantisedTrack> TrackRefit::descend(std::vector<Hold> holds, doubl
 class WindowRefit {
 public:
     WindowRefit(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
-    void refit(uint32_t track);
+    void refit_all();
 
 private:
+    /// A track whose turn it is.
+    struct Turn {
+        uint32_t track;
+        std::vector<std::vector<Response>> does;  ///< by sample of its life
+        std::optional<QuantisedTrack> better;
+        TrackSamples now;  ///< what that decodes to
+    };
     SurfaceResponse& surface(int sample) { return *surfaces_[size_t(sample)]; }
+    const SurfaceResponse& surface(int sample) const { return *surfaces_[size_t(sample)]; }
     Hold hold_of(const SurfaceResponse& surface, uint32_t point, const std::vector<Response>& does, const glm::vec3& off) const;
-    void follow(const TrackSamples& before, const TrackSamples& after);
+    void choose(Turn& turn) const;
+    void follow(const Turn& turn);
 
     const Window& window_;
     CodedWindow& coded_;
@@ -134,13 +147,11 @@ private:
     double square_ = 0;  ///< area × share² that holds a point, on average: m²
     std::vector<std::unique_ptr<SurfaceResponse>> surfaces_;
     std::vector<std::vector<uint32_t>> point_;  ///< by sample and track
-    std::vector<std::vector<Response>> does_;   ///< by sample: the track at hand
-    std::vector<uint32_t> slots_;
 };
 
 WindowRefit::WindowRefit(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables)
     : window_(window), coded_(coded), goal_(goal), tables_(tables), lever_(goal.quantiser.step / goal.quantiser.normal_step),
-      surfaces_(window.frames.size()), point_(window.frames.size()), does_(window.frames.size()) {
+      surfaces_(window.frames.size()), point_(window.frames.size()) {
     parallel_for(surfaces_.size(), goal.jobs, [&](size_t s) {
         std::vector<uint32_t> ids;
         const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
@@ -173,41 +184,61 @@ Hold WindowRefit::hold_of(const SurfaceResponse& surface, uint32_t point, const 
     return hold;
 }
 
-/// The surfaces go where the track at hand takes them.
-void WindowRefit::follow(const TrackSamples& before, const TrackSamples& after) {
-    for (size_t k = 0; k < before.position.size(); ++k) {
-        const glm::vec3 &n = before.normal[k], turn = after.normal[k] - n;
+void WindowRefit::choose(Turn& turn) const {
+    thread_local std::vector<uint32_t> slots;
+    const TrackSamples& decoded = coded_.decoded[turn.track];
+    const Path& path = window_.paths[turn.track];
+    turn.does.resize(decoded.position.size());
+    std::vector<Hold> holds;
+    for (size_t k = 0; k < turn.does.size(); ++k) {
+        const int s = path.birth + int(k);
+        const uint32_t point = point_[size_t(s)][turn.track];
+        surface(s).of(point, turn.does[k], slots);
+        holds.push_back(hold_of(surface(s), point, turn.does[k], decoded.normal[k] - path.target(s).normal));
+    }
+    const double step = goal_.quantiser.step, worth = bits_per_square / (square_ * step * step);
+    TrackRefit integers(coded_.tracks[turn.track], decoded, coded_.quantiser, goal_.origin, tables_);
+    turn.better = integers.descend(std::move(holds), worth);
+    if (turn.better) turn.now = dequantise_track(*turn.better, coded_.quantiser, goal_.origin, tables_);
+}
+
+/// The surfaces go where the track takes them.
+void WindowRefit::follow(const Turn& turn) {
+    const TrackSamples& before = coded_.decoded[turn.track];
+    for (size_t k = 0; k < turn.does.size(); ++k) {
+        const glm::vec3 &n = before.normal[k], by = turn.now.normal[k] - n;
         const TangentFrame tangents = tangent_frame(n);
-        const glm::vec3 move(glm::dot(after.position[k] - before.position[k], n), glm::dot(turn, tangents.t1), glm::dot(turn, tangents.t2));
+        const glm::vec3 move(glm::dot(turn.now.position[k] - before.position[k], n), glm::dot(by, tangents.t1), glm::dot(by, tangents.t2));
         std::vector<float>& residual = surface(before.birth + int(k)).residual;
-        for (const Response& r : does_[k]) residual[r.vertex] += glm::dot(r.by, move);
+        for (const Response& r : turn.does[k]) residual[r.vertex] += glm::dot(r.by, move);
     }
 }
 
-void WindowRefit::refit(uint32_t track) {
-    TrackSamples& decoded = coded_.decoded[track];
-    const Path& path = window_.paths[track];
-    std::vector<Hold> holds;
-    for (size_t k = 0; k < decoded.position.size(); ++k) {
-        const int s = path.birth + int(k);
-        const uint32_t point = point_[size_t(s)][track];
-        surface(s).of(point, does_[k], slots_);
-        holds.push_back(hold_of(surface(s), point, does_[k], decoded.normal[k] - path.target(s).normal));
+void WindowRefit::refit_all() {
+    const size_t count = window_.paths.size();
+    uint32_t blocks = 0;
+    const std::vector<uint32_t> block = assign_blocks(coded_.decoded, std::max(fewest_apart, uint32_t(count / together)), blocks);
+    std::vector<std::vector<uint32_t>> tracks(blocks);
+    for (uint32_t i = 0; i < count; ++i) tracks[block[i]].push_back(i);
+    std::vector<Turn> turns;
+    for (size_t round = 0;; ++round) {
+        turns.clear();
+        for (const std::vector<uint32_t>& of_block : tracks)
+            if (round < of_block.size()) turns.push_back({of_block[round], {}, {}, {}});
+        if (turns.empty()) return;
+        parallel_for(turns.size(), goal_.jobs, [&](size_t i) { choose(turns[i]); });
+        for (Turn& turn : turns) {
+            if (!turn.better) continue;
+            follow(turn);
+            coded_.tracks[turn.track] = std::move(*turn.better), coded_.decoded[turn.track] = std::move(turn.now);
+        }
     }
-    const double step = goal_.quantiser.step, worth = bits_per_square / (square_ * step * step);
-    TrackRefit integers(coded_.tracks[track], decoded, coded_.quantiser, goal_.origin, tables_);
-    std::optional<QuantisedTrack> better = integers.descend(std::move(holds), worth);
-    if (!better) return;
-    TrackSamples now = dequantise_track(*better, coded_.quantiser, goal_.origin, tables_);
-    follow(decoded, now);
-    coded_.tracks[track] = std::move(*better), decoded = std::move(now);
 }
 
 }  // namespace
 
 void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables) {
-    WindowRefit surfaces(window, coded, goal, tables);
-    for (uint32_t i = 0; i < window.paths.size(); ++i) surfaces.refit(i);
+    WindowRefit(window, coded, goal, tables).refit_all();
 }
 
 }  // namespace rill::cooker
