@@ -25,9 +25,9 @@ constexpr double most_miss = 0.3;            // edges, of such liquid from the s
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
-/// Of the error aimed at: what an attempt begins with. Three splashes take about 1.45 at a quarter of an edge; the finer, the
+/// Of the error aimed at: what an attempt begins with. Three splashes take about 1.4 at a quarter of an edge; the finer, the
 /// more of the error is not the points'.
-double first_tolerance(double edges) { return 1.42 * std::pow(edges / 0.25, 0.2); }
+double first_tolerance(double edges) { return 1.38 * std::pow(edges / 0.25, 0.2); }
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
