@@ -22,6 +22,7 @@ struct PatchFit {
     };
     std::vector<Neighbour> neighbours;
     glm::dmat3 inverse{0.0};  ///< of the normal equations; 0: the patch stays flat
+    glm::dvec3 quadratic{0.0};  ///< xx, xy, yy: height over the surface has it added
 
     void begin(double reach, double scale) { reach_ = reach, scale_ = scale, equations_ = glm::dmat3(0.0), neighbours.clear(); }
     void add(uint32_t point, double distance, double x, double y, double height) {
@@ -38,7 +39,8 @@ struct PatchFit {
         for (const Neighbour& n : neighbours) q += by(n) * n.height;
         const double middle = 0.5 * (q.x + q.z), half = 0.5 * (q.x - q.z);
         const double bend = (std::abs(middle) + std::sqrt(half * half + 0.25 * q.y * q.y)) * support;
-        if (bend > surface::most_bend) inverse *= surface::most_bend / bend;
+        const double kept = bend > surface::most_bend ? surface::most_bend / bend : 1;
+        inverse *= kept, quadratic = q * kept;
     }
     /// The quadratic per metre of a neighbour's height.
     glm::dvec3 by(const Neighbour& n) const { return inverse * n.row * (-scale_ * scale_); }
@@ -65,7 +67,7 @@ SurfaceResponse::SurfaceResponse(const SurfaceFrame& frame, const std::vector<Su
     for (const SurfacePoint& p : points) tangents.push_back(tangent_frame(p.normal));
     for (size_t v = 0; v < area.size(); ++v)
         if (std::fabs(residual[v]) > credible) area[v] = 0;
-    twists_.assign(points.size(), {});
+    twists_.assign(points.size(), {}), curvature.assign(points.size(), glm::vec3(0));
     if (points.empty()) return;
     const PointField decoded(points);
     find_shares(frame, points, decoded.field);
@@ -132,6 +134,7 @@ void SurfaceResponse::find_bends(const std::vector<SurfacePoint>& points, const 
             fit.add(other, std::sqrt(near.d2[k][lane]), glm::dot(r, tangents[own].t1), glm::dot(r, tangents[own].t2), glm::dot(r, centre.normal));
         }
         fit.solve(field.support[i]);
+        curvature[own] = glm::vec3(-2 * fit.quadratic.x, -fit.quadratic.y, -2 * fit.quadratic.z);
         glm::dvec3 moved(0), turned[2] = {glm::dvec3(0), glm::dvec3(0)};
         for (const PatchFit::Neighbour& n : fit.neighbours) {
             const glm::dvec3 by = fit.by(n);

@@ -22,6 +22,7 @@ public:
     std::vector<float> residual;          ///< per vertex, metres: Residual::distance
     std::vector<float> area;              ///< per vertex, m²; 0: takes no part
     std::vector<TangentFrame> tangents;   ///< per point: its tilts are along these
+    std::vector<glm::vec3> curvature;     ///< per point, 1/m: xx, xy, yy of its patch, along its tangents, up along its normal
     /// All that the point does. `slots` is memory for the caller to keep between calls.
     void of(uint32_t point, std::vector<Response>& out, std::vector<uint32_t>& slots) const;
     /// Sums over the vertices: area × the point's share, area × share², m².

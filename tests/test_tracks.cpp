@@ -163,13 +163,15 @@ TEST_CASE("what a point does to the decoded surface is known to first order") {
     std::vector<Response> does;
     std::vector<uint32_t> slots;
     double all = 0, missed = 0;  // squares of what changes, and of what that is not as told
-    const auto try_move = [&](uint32_t i, const glm::vec3& move) {
+    const auto try_move = [&](uint32_t i, glm::vec3 move, const glm::vec2& slide = glm::vec2(0)) {
         std::vector<SurfacePoint> moved = points;
         const TangentFrame tangents = surface.tangents[i];
-        moved[i].position += move.x * points[i].normal;
+        moved[i].position += move.x * points[i].normal + slide.x * tangents.t1 + slide.y * tangents.t2;
         moved[i].normal = glm::normalize(points[i].normal + move.y * tangents.t1 + move.z * tangents.t2);
         const std::vector<float> after = measure_residual(frame, moved).distance;
         std::vector<float> told(after.size(), 0.f);
+        const glm::vec3& bent = surface.curvature[i];
+        move += glm::vec3(0, bent.x * slide.x + bent.y * slide.y, bent.y * slide.x + bent.z * slide.y);
         surface.of(i, does, slots);
         for (const Response& r : does) told[r.vertex] = glm::dot(r.by, move);
         for (size_t v = 0; v < after.size(); ++v) {
@@ -184,6 +186,12 @@ TEST_CASE("what a point does to the decoded surface is known to first order") {
         for (uint32_t i = 0; i < points.size(); i += 5) try_move(i, move);
         INFO("share missed: " << missed / all);
         CHECK(missed < 0.1 * all);
+    }
+    for (const glm::vec2& slide : {glm::vec2(4 * small * frame.edge, 0), glm::vec2(0, 4 * small * frame.edge)}) {
+        all = missed = 0;
+        for (uint32_t i = 0; i < points.size(); i += 5) try_move(i, glm::vec3(0), slide);
+        INFO("share missed: " << missed / all);
+        CHECK(missed < 0.5 * all);
     }
 }
 
@@ -201,10 +209,14 @@ TEST_CASE("coefficients chosen anew make up for each other, the same for any num
         }
         return sum;
     };
-    // Every fifth track two steps too high.
+    // Every fifth track two steps too high, every fifth from the third on aslant.
     CodedWindow spoilt = coded;
     for (size_t i = 0; i < spoilt.tracks.size(); i += 5) {
         spoilt.tracks[i].position[2] += 2;
+        spoilt.decoded[i] = dequantise_track(spoilt.tracks[i], spoilt.quantiser, goal.origin, tables());
+    }
+    for (size_t i = 2; i < spoilt.tracks.size(); i += 5) {
+        spoilt.tracks[i].axis[0] += spoilt.tracks[i].axis[0] > 0 ? -1 : 1;
         spoilt.decoded[i] = dequantise_track(spoilt.tracks[i], spoilt.quantiser, goal.origin, tables());
     }
     CodedWindow refitted = spoilt, again = spoilt;
