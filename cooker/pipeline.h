@@ -49,6 +49,7 @@ struct Window {
     bool opens_span = false;             ///< nothing comes from before: the surface stands there from the start
     std::vector<std::shared_ptr<const SurfaceFrame>> frames;
     std::vector<std::vector<glm::vec3>> motion;  ///< of every vertex of frames[s] onto frames[s + 1], metres
+    bool calm = false;                   ///< `motion` is the liquid's own
     bool slips = false;                  ///< the liquid goes another way than `motion`, along the surface: slip is kept
     std::vector<double> seconds;
     std::vector<Path> paths;

@@ -17,17 +17,18 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int most_attempts = 3;
-constexpr double finer_by = 0.05;       // an error below its target by more is bytes nobody asked for, and worth another attempt
+constexpr double finer_by = 0.1;             // an error below its target by more is bytes nobody asked for, and worth another attempt
 constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
 constexpr double least_gain = 0.4;           // of the error's logarithm per that of the tolerance: crevices narrower than a
                                              // cell stay, and points without end would not tell them
 constexpr double most_miss = 0.3;            // edges, of such liquid from the surface: velocities that carry nothing have more
+constexpr double calm_tolerance = 1.1;       // of such liquid: at the same tolerance its error is a tenth below that of other liquid
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
 /// Of the error aimed at: what an attempt begins with. Three splashes take about 1.4 at a quarter of an edge; the finer, the
 /// more of the error is not the points'.
-double first_tolerance(double edges) { return 1.38 * std::pow(edges / 0.25, 0.2); }
+double first_tolerance(double edges) { return 1.4 * std::pow(edges / 0.25, 0.2); }
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
@@ -101,7 +102,8 @@ bool go_with_liquid(Window& window, int jobs) {
 
 /// How points go from frame to frame. `known`: the velocities are the liquid's own; `slip`: it is kept.
 void find_motion(Window& window, Past past, bool known, bool slip, int jobs) {
-    if (known && go_with_liquid(window, jobs)) return;
+    window.calm = known && go_with_liquid(window, jobs);
+    if (window.calm) return;
     window.slips = known && slip;
     for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
         const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
@@ -174,7 +176,6 @@ std::vector<size_t> SpanCook::judged_frames_of(uint32_t span) const {
 }
 
 SpanResult SpanCook::cook(uint32_t span, const std::string& output, double tolerance, const std::function<void(uint32_t)>& done) const {
-    const WindowGoal goal = goal_for(tolerance, survey_, settings_.jobs);
     AssetWriter writer(output);
     const SequenceInfo& info = reader_.info();
     const uint32_t begin = plan_.first(span), end = plan_.last(span);
@@ -188,6 +189,7 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
         Window window = load(first, std::min(end, first + plan_.window), past, float(tolerance));
         window.opens_span = first == begin;
         const uint32_t last = first + uint32_t(window.samples()) - 1;
+        const WindowGoal goal = goal_for(tolerance * (window.calm ? calm_tolerance : 1), survey_, settings_.jobs);
         grow_tracks(window, survivors, goal);
         const CodedWindow coded = code_tracks(window, goal, tables_);
         write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), last == end, result);

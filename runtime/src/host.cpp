@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <chrono>
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
@@ -48,7 +47,6 @@ struct ThreadPool {
     std::condition_variable wake;
     std::deque<Batch> needed, prefetch;  ///< what the frame waits for goes first
     std::vector<std::thread> threads;
-    std::atomic<uint32_t> batches{0};    ///< in both
     bool stopping = false;
 
     /// Takes one task out under the lock and runs it outside. False: there is none.
@@ -57,35 +55,19 @@ struct ThreadPool {
         if (queue.empty()) return false;
         Batch& batch = queue.front();
         const Batch mine = batch;
-        if (++batch.next == batch.count) queue.pop_front(), batches.fetch_sub(1, std::memory_order_relaxed);
+        if (++batch.next == batch.count) queue.pop_front();
         lock.unlock();
         mine.task(mine.context, mine.next, worker);
         lock.lock();
         return true;
     }
 
-    /// The stages of a frame follow each other within microseconds, and to fall asleep and be woken between them takes longer
-    /// than most of them do.
-    bool wait_awake(std::unique_lock<std::mutex>& lock) {
-        constexpr auto patience = std::chrono::microseconds(200);
-        lock.unlock();
-        const auto until = std::chrono::steady_clock::now() + patience;
-        bool more = false;
-        while (!more && std::chrono::steady_clock::now() < until) {
-            std::this_thread::yield();
-            more = batches.load(std::memory_order_relaxed) != 0;
-        }
-        lock.lock();
-        return more;
-    }
-
     void work(uint32_t worker) {
         std::unique_lock<std::mutex> lock(mutex);
-        for (bool awake = false;;) {
-            if (run_one(lock, worker)) awake = true;
-            else if (stopping) return;
-            else if (awake) awake = wait_awake(lock);
-            else wake.wait(lock);
+        for (;;) {
+            if (run_one(lock, worker)) continue;
+            if (stopping) return;
+            wake.wait(lock);
         }
     }
 
@@ -124,7 +106,6 @@ Jobs thread_jobs(ThreadPool* pool) noexcept {
         {
             const std::lock_guard<std::mutex> lock(pool.mutex);
             (needed_this_frame ? pool.needed : pool.prefetch).push_back({task, context, 0, count});
-            pool.batches.fetch_add(1, std::memory_order_relaxed);
         }
         count == 1 ? pool.wake.notify_one() : pool.wake.notify_all();
     };
