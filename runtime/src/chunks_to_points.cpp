@@ -131,8 +131,6 @@ void run_evaluate(void* context, uint32_t index, uint32_t) {
 
 }  // namespace
 
-const Stage evaluate_stages[evaluate_stage_count] = {
-    {prepare_evaluate, run_evaluate, false},
-};
+const Stage evaluate_stage = {prepare_evaluate, run_evaluate, false};
 
 }  // namespace rill

@@ -233,8 +233,7 @@ struct Evaluation {
     uint32_t points_wanted;        ///< points and drops active in the chunks drawn
     bool cut;
 };
-inline constexpr uint32_t evaluate_stage_count = 1;
-extern const Stage evaluate_stages[evaluate_stage_count];  ///< context Player
+extern const Stage evaluate_stage;  ///< context Player
 
 // ---- plan, time there is → detail -----------------------------------------------------------------
 

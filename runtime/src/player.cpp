@@ -212,7 +212,7 @@ void chain_stages(Player& player) {
     relay.add(&decode_stage, 1, &player);
     relay.add(&mark_stage, 1, &player.decode_done);
     if (player.frame.target) {
-        relay.add(evaluate_stages, evaluate_stage_count, &player);
+        relay.add(&evaluate_stage, 1, &player);
         relay.add(field_stages, field_stage_count, &player);
         relay.add(&mark_stage, 1, &player.mesh_begun);
         uint32_t count;
