@@ -6,18 +6,23 @@
 #include <cmath>
 #include <numeric>
 
+#include "format/layout.h"
+#include "frames_to_tracks.h"
 #include "parallel.h"
-#include "pipeline.h"
 
 namespace rill::cooker {
 namespace {
 
 constexpr int frame_stride = 3;        // of the frames that are looked at; the ends always are
 constexpr float same_side = 0.3f;
-constexpr float growth = 1.5f;         // of what is taken, from one round to the next
+constexpr int measured_stride = 8;     // of the frames on which errors are measured
+constexpr float growth = 1.5f;         // of what is taken, from one round to the next, at most
+constexpr float least_step = 0.03f, most_step = 0.25f;  // likewise where an error is aimed at, which falls with its square
 constexpr float room = 0.6f;           // of the distance to what was taken before: no two of a round are nearer
 constexpr size_t least_taken = 24;     // tracks in layer 0, where there are so many
 constexpr float least_share = 0.11f;   // of the cost: layer 0
+constexpr float most_share = 0.75f;    // all layers but the last
+constexpr float least_refined = 1.15f;  // times the cost of the layers before
 constexpr uint32_t drops_layer = 1;    // smaller than cells of layer 0
 
 /// All tracks alive at one looked-at frame.
@@ -111,34 +116,71 @@ void take_round(const std::vector<Look>& looks, const std::vector<float>& cost, 
     }
 }
 
+/// Error of the taken tracks, on a few frames of the window.
+LayerError measure_taken(const Window& window, const std::vector<TrackSamples>& tracks, const std::vector<bool>& taken, int jobs) {
+    const size_t looks = (window.frames.size() + measured_stride - 1) / measured_stride;
+    std::vector<LayerError> at(looks);
+    parallel_for(looks, jobs, [&](size_t look) {
+        const SurfaceFrame& frame = *window.frames[look * measured_stride];
+        const auto points = decoded_points(tracks, int(look * measured_stride), nullptr, &taken);
+        const Residual residual = measure_residual(frame, points);
+        double area = 0, sum = 0;
+        for (size_t v = 0; v < residual.distance.size(); ++v)
+            area += frame.area[v], sum += frame.area[v] * std::min(std::fabs(residual.distance[v]), 10 * frame.edge);
+        at[look].mean = area > 0 ? float(sum / area) : 0;
+        at[look].p99 = float(std::min(residual_percentile(frame, residual, 0.99), 10.0 * frame.edge));
+        at[look].spacing = points.empty() ? 0 : float(std::sqrt(area / double(points.size())));
+    });
+    LayerError error;
+    for (const LayerError& look : at) {
+        error.mean += look.mean / float(looks), error.p99 += look.p99 / float(looks);
+        error.spacing = std::max(error.spacing, look.spacing);
+    }
+    return error;
+}
+
+float cost_of(const std::vector<bool>& taken, const std::vector<float>& cost) {
+    float spent = 0;
+    for (size_t i = 0; i < taken.size(); ++i)
+        if (taken[i]) spent += cost[i];
+    return spent;
+}
+
 }  // namespace
 
-std::vector<uint32_t> assign_layers(const std::vector<TrackSamples>& tracks, const std::vector<float>& cost, int samples,
-                                    uint32_t layers, int jobs) {
-    std::vector<uint32_t> layer(tracks.size(), layers - 1);
+Layers assign_layers(const Window& window, const std::vector<TrackSamples>& tracks, const std::vector<float>& cost, uint32_t layers,
+                     int jobs) {
+    Layers result{std::vector<uint32_t>(tracks.size(), layers - 1), std::vector<LayerError>(layers)};
     std::vector<bool> taken(tracks.size(), false);
-    std::vector<Look> looks = looks_of(tracks, samples);
+    std::vector<Look> looks = looks_of(tracks, window.samples());
     const float all = std::accumulate(cost.begin(), cost.end(), 0.f);
+    /// False when nothing is wrong any more.
+    const auto take_more = [&](float budget) {
+        const auto count = std::count(taken.begin(), taken.end(), true);
+        parallel_for(looks.size(), jobs, [&](size_t s) { look_again(looks[s], taken); });
+        take_round(looks, cost, budget, taken);
+        return std::count(taken.begin(), taken.end(), true) > count;
+    };
     for (uint32_t l = 0; l + 1 < layers; ++l) {
-        const float share = std::max(l == 0 ? 0.f : least_share, std::ldexp(1.f, int(l) + 1 - int(layers)));
-        const float wanted = all * (l == 0 ? std::min(share, least_share) : share);
-        for (;;) {
-            float spent = 0;
-            size_t count = 0;
-            for (size_t i = 0; i < taken.size(); ++i)
-                if (taken[i]) spent += cost[i], ++count;
-            if (spent >= wanted && count >= least_taken) break;
-            parallel_for(looks.size(), jobs, [&](size_t s) { look_again(looks[s], taken); });
-            const float more = count == 0 ? 0.15f * wanted : std::min(wanted - spent, (growth - 1) * spent);
-            take_round(looks, cost, more, taken);
-            if (size_t(std::count(taken.begin(), taken.end(), true)) == count) break;  // nothing is wrong any more
+        const float least = l == 0 ? all * std::min(least_share, std::ldexp(1.f, 1 - int(layers))) : least_refined * cost_of(taken, cost);
+        const size_t least_count = l == 0 ? least_taken : 0;
+        for (float spent = cost_of(taken, cost); spent < least || size_t(std::count(taken.begin(), taken.end(), true)) < least_count;
+             spent = cost_of(taken, cost))
+            if (!take_more(spent == 0 ? 0.15f * least : std::min(least - spent, (growth - 1) * spent))) break;
+        result.error[l] = measure_taken(window, tracks, taken, jobs);
+        // A cell of this layer's: twice as wide as the next one's.
+        const float allowed = format::fine_enough * std::ldexp(window.frames[0]->edge, int(layers - 1 - l));
+        for (float spent; l > 0 && result.error[l].p99 > allowed && (spent = cost_of(taken, cost)) < most_share * all;) {
+            if (!take_more(std::clamp(std::sqrt(result.error[l].p99 / allowed) - 1, least_step, most_step) * spent)) break;
+            result.error[l] = measure_taken(window, tracks, taken, jobs);
         }
         for (size_t i = 0; i < taken.size(); ++i)
-            if (taken[i] && layer[i] == layers - 1) layer[i] = l;
+            if (taken[i] && result.layer[i] == layers - 1) result.layer[i] = l;
     }
+    result.error[layers - 1] = measure_taken(window, tracks, std::vector<bool>(tracks.size(), true), jobs);
     for (size_t i = 0; i < tracks.size(); ++i)
-        if (tracks[i].drop) layer[i] = std::min(drops_layer, layers - 1);
-    return layer;
+        if (tracks[i].drop) result.layer[i] = std::min(drops_layer, layers - 1);
+    return result;
 }
 
 std::vector<uint32_t> assign_blocks(const std::vector<TrackSamples>& tracks, uint32_t most_tracks, uint32_t& block_count) {

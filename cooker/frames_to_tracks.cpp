@@ -164,7 +164,7 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
 /// The points of a frame as coded, and the tracks from `first` on, which are not coded yet.
 Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, int sample) {
     Sweep sweep;
-    sweep.points = decoded_points(coded.decoded, sample, nullptr, 0, &sweep.ids);
+    sweep.points = decoded_points(coded.decoded, sample, &sweep.ids);
     for (size_t i = first; i < window.paths.size(); ++i)
         if (window.paths[i].alive(sample)) sweep.ids.push_back(uint32_t(i)), sweep.points.push_back(window.paths[i].target(sample));
     return sweep;
@@ -196,7 +196,7 @@ void correct_window(Window& window, const CodedWindow& coded, const WindowGoal& 
     parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
         const SurfaceFrame& frame = *window.frames[s];
         std::vector<uint32_t> ids;
-        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
+        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), &ids);
         const Residual residual = measure_residual(frame, points);
         correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
     });
@@ -383,12 +383,12 @@ std::vector<Path> survivors_of(const Window& window) {
     return survivors;
 }
 
-std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample,
-                                         const std::vector<uint32_t>* layer, uint32_t last_layer, std::vector<uint32_t>* ids) {
+std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample, std::vector<uint32_t>* ids,
+                                         const std::vector<bool>* only) {
     std::vector<SurfacePoint> points;
     for (uint32_t i = 0; i < decoded.size(); ++i) {
         const TrackSamples& track = decoded[i];
-        if (sample < track.birth || sample > track.death || track.drop || (layer && (*layer)[i] > last_layer)) continue;
+        if (sample < track.birth || sample > track.death || track.drop || (only && !(*only)[i])) continue;
         const size_t k = size_t(sample - track.birth);
         points.push_back({track.position[k], track.normal[k], {}});
         if (ids) ids->push_back(i);

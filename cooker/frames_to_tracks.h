@@ -29,9 +29,8 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
 void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
 /// Those that reach the last sample, as one-sample paths: what the next window continues.
 std::vector<Path> survivors_of(const Window& window);
-/// Decoded points at a sample, with the tracks they belong to; only layers ≤ last_layer.
-std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample,
-                                         const std::vector<uint32_t>* layer = nullptr, uint32_t last_layer = 0,
-                                         std::vector<uint32_t>* ids = nullptr);
+/// Decoded points at a sample; `ids`: the tracks they belong to; `only`: of those.
+std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample, std::vector<uint32_t>* ids = nullptr,
+                                         const std::vector<bool>* only = nullptr);
 
 }  // namespace rill::cooker

@@ -102,11 +102,19 @@ std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vec
 void correct_paths(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
                    const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths);
 
-/// Layer of every track (0 coarsest), from what the tracks decode to and what each costs (any unit). A prefix of
-/// layers is a closed surface in every frame, wrong nowhere by much more than elsewhere. Layer 0 takes at most an
-/// eighth of the cost, every further one about doubles what is there.
-std::vector<uint32_t> assign_layers(const std::vector<TrackSamples>& tracks, const std::vector<float>& cost, int samples,
-                                    uint32_t layers, int jobs);
+/// Of a layer and all coarser ones, against the source over a window: metres.
+struct LayerError {
+    float mean = 0, p99 = 0, spacing = 0;
+};
+struct Layers {
+    std::vector<uint32_t> layer;         ///< of every track, 0 coarsest
+    std::vector<LayerError> error;       ///< of every layer
+};
+/// From what the tracks decode to and what each costs (any unit). A prefix of layers is a closed surface in every frame, wrong
+/// nowhere by much more than elsewhere. Layer 0 takes at most a ninth of the cost; every further one is as large as it must be
+/// to be fine enough for cells twice as large as the next one's, the last but one for cells of two source edges.
+Layers assign_layers(const Window& window, const std::vector<TrackSamples>& tracks, const std::vector<float>& cost, uint32_t layers,
+                     int jobs);
 /// Block of every track: a median split of the mean positions, at most 2^splits blocks.
 std::vector<uint32_t> assign_blocks(const std::vector<TrackSamples>& tracks, uint32_t most_tracks, uint32_t& block_count);
 

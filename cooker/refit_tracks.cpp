@@ -214,7 +214,7 @@ WindowRefit::WindowRefit(const Window& window, CodedWindow& coded, const WindowG
       surfaces_(window.frames.size()), point_(window.frames.size()) {
     parallel_for(surfaces_.size(), goal.jobs, [&](size_t s) {
         std::vector<uint32_t> ids;
-        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), nullptr, 0, &ids);
+        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), &ids);
         surfaces_[s] = std::make_unique<SurfaceResponse>(*window.frames[s], points, credible * goal.tolerance);
         point_[s].resize(coded.decoded.size());
         for (uint32_t i = 0; i < ids.size(); ++i) point_[s][ids[i]] = i;

@@ -31,38 +31,6 @@ void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, 
         }
 }
 
-struct LayerError {
-    float mean = 0, p99 = 0, spacing = 0;
-};
-/// Error of every prefix of layers, on a few frames of the window.
-std::vector<LayerError> layer_errors(const Window& window, const CodedWindow& coded, const std::vector<uint32_t>& layer,
-                                     uint32_t layers, int jobs) {
-    constexpr int stride = 8;
-    std::vector<LayerError> errors(layers);
-    const size_t looks = (window.frames.size() + stride - 1) / stride;
-    std::vector<std::vector<LayerError>> at(looks, std::vector<LayerError>(layers));
-    parallel_for(looks * layers, jobs, [&](size_t task) {
-        const int s = int(task / layers) * stride;
-        const uint32_t l = uint32_t(task % layers);
-        const SurfaceFrame& frame = *window.frames[size_t(s)];
-        const auto points = decoded_points(coded.decoded, s, &layer, l);
-        const Residual residual = measure_residual(frame, points);
-        double area = 0, sum = 0;
-        for (size_t v = 0; v < residual.distance.size(); ++v)
-            area += frame.area[v], sum += frame.area[v] * std::min(std::fabs(residual.distance[v]), 10 * frame.edge);
-        LayerError& error = at[task / layers][l];
-        error.mean = area > 0 ? float(sum / area) : 0;
-        error.p99 = float(std::min(residual_percentile(frame, residual, 0.99), 10.0 * frame.edge));
-        error.spacing = points.empty() ? 0 : float(std::sqrt(area / double(points.size())));
-    });
-    for (const auto& look : at)
-        for (uint32_t l = 0; l < layers; ++l) {
-            errors[l].mean += look[l].mean / float(looks), errors[l].p99 += look[l].p99 / float(looks);
-            errors[l].spacing = std::max(errors[l].spacing, look[l].spacing);
-        }
-    return errors;
-}
-
 /// Tracks that end here, by how long they lived and why.
 void count_lives(SpanResult& account, const Window& window, bool ends_span) {
     account.deaths.resize(std::size(death_names));
@@ -80,10 +48,9 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
                   uint32_t layers, bool ends_span, SpanResult& account) {
     std::vector<float> cost;
     for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
-    const std::vector<uint32_t> layer = assign_layers(coded.decoded, cost, window.samples(), layers, goal.jobs);
+    const auto [layer, errors] = assign_layers(window, coded.decoded, cost, layers, goal.jobs);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(coded.decoded, most_tracks_per_block, block_count);
-    const std::vector<LayerError> errors = layer_errors(window, coded, layer, layers, goal.jobs);
     std::vector<ChunkToWrite> chunks(size_t(layers) * block_count);
     parallel_for(chunks.size(), goal.jobs, [&](size_t c) {
         ChunkToWrite& chunk = chunks[c];

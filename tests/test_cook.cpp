@@ -173,6 +173,16 @@ TEST_CASE("layers: closed from the first on, nearer with each, and cheap first")
     CHECK(first < 0.28 * double(all));  // an eighth, but for what a chunk of thirty tracks costs before its first
 }
 
+TEST_CASE("the last layer but one is as fine as cells of two edges can show, and not much finer") {
+    const AssetDirectory directory = read_directory(whole().asset);
+    const float shown = rill::format::fine_enough * 2 * directory.header.cell_size;
+    for (const auto& chunk : directory.chunks) {
+        if (chunk.layer != 1) continue;
+        CHECK(chunk.error_p99 <= shown);
+        CHECK(chunk.error_p99 > 0.3f * shown);
+    }
+}
+
 TEST_CASE("at a window's border nothing pops: either side is within the coding error of the same frame") {
     AssetPlayer player(whole().asset);
     for (int border : {3, 6}) {

@@ -157,6 +157,31 @@ TEST_CASE("a camera that trembles asks for nothing new") {
     CHECK(trembles == 0);
 }
 
+TEST_CASE("a layer ends a few points at a time, as the camera moves away") {
+    Opened opened(make_ball({.points = 2400}));
+    REQUIRE(opened.open() == Status::ok);
+    Playing playing(opened);
+    set_identity(playing.frame.asset_to_world);
+    playing.frame.view_count = 1;
+    playing.frame.budget.pixel_error = 4;
+    const auto points_from = [&](float distance) {
+        const rill::View view = everything({distance, 0, 0});
+        playing.frame.views = &view;
+        CHECK(playing.draw(0.1) >= Status::ok);
+        return playing.stats.points_used;
+    };
+    const uint32_t all = points_from(2);
+    uint32_t before = all, largest_step = 0, back = 0;
+    for (float distance = 2; distance < 200; distance *= 1.01f) {
+        const uint32_t now = points_from(distance);
+        largest_step = std::max(largest_step, now < before ? before - now : 0), back += now > before;
+        before = now;
+    }
+    CHECK(before < all / 3);
+    CHECK(largest_step < all / 20);
+    CHECK(back == 0);
+}
+
 TEST_CASE("no open edge in sight at random cameras, and finer where it is nearer") {
     Opened opened(make_ball({.points = 2400}));
     REQUIRE(opened.open() == Status::ok);

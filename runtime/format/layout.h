@@ -83,6 +83,10 @@ struct ChunkRecord {            // 72 bytes
     float error_p99;            ///< likewise the 99th percentile
     uint32_t reserved;          ///< 0
 };
+/// In cells: a layer whose p99 is no more is fine enough to be drawn with them. dam_break from 4 diagonals, cells of 2 pixels: with 1
+/// cell the drawn surface was off by a p99 of 2.6 pixels for no fewer triangles; with .65 of 1.0 at most, with .5 of .8.
+inline constexpr float fine_enough = 0.5f;
+
 inline constexpr uint32_t window_record_bytes = 24;
 inline constexpr uint32_t chunk_record_bytes = 72;
 static_assert(sizeof(WindowRecord) == window_record_bytes && sizeof(ChunkRecord) == chunk_record_bytes,

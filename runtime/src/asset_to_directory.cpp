@@ -9,6 +9,8 @@
 namespace rill {
 namespace {
 
+constexpr float farthest = 1e15f;
+
 using Phase = Asset::Phase;
 
 Status fail(Asset& asset, Status status, const char* reason) {
@@ -96,8 +98,8 @@ void average_errors(Directory& d) {
         weight[c.layer] += c.point_count;
     }
     for (uint32_t l = 0; l < d.header.layer_count; ++l) {
-        d.layer_error[l] = weight[l] > 0 ? float(sum[l] / weight[l]) : 0;
-        if (l && !(d.layer_error[l] < d.layer_error[l - 1])) d.layer_error[l] = d.layer_error[l - 1];
+        const float before = l ? d.layer_error[l - 1] : farthest;  // a layer without points mends nothing
+        d.layer_error[l] = weight[l] > 0 ? std::min(float(sum[l] / weight[l]), before) : before;
     }
 }
 
@@ -186,6 +188,11 @@ Status advance_directory(Asset& asset) {
 }
 
 }  // namespace
+
+float layer_limit(const Directory& directory, uint32_t layer) noexcept {
+    if (layer == 0) return farthest;
+    return std::max(directory.layer_error[layer - 1] / format::fine_enough, directory.header.cell_size / layer_fades);
+}
 
 double frame_time(const Directory& directory, uint32_t index) noexcept {
     return directory.header.frame_time_count ? directory.tables.frame_times[index]

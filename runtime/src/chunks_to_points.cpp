@@ -2,6 +2,7 @@
 // Resident chunks at a moment → points and drops. Who is alive is counted first, so that tasks may write to
 // fixed places. The order of points is that of the pieces, whoever runs them.
 #include <algorithm>
+#include <cmath>
 
 #include "pipeline.h"
 
@@ -100,6 +101,32 @@ void cull_points(const Plan& plan, float margin, format::PointSet& points) {
     }
 }
 
+float zigzag(float x) { return std::abs(2 * (x - std::floor(x)) - 1); }  // 0 … 1
+
+/// When it is the turn of a place to lose a layer, 0 … 1: smooth, so that a point that moves or goes on in the next window keeps its turn,
+/// and other a few points on, so that those whose turn it is have neighbours that are whole.
+float turn_at(const float* place, float wave) {
+    const float x = place[0] / wave, y = place[1] / wave, z = place[2] / wave;
+    const float along = x + 0.75f * y - 0.57f * z, across = 0.57f * x - y + 0.75f * z, up = 0.75f * x + 0.57f * y + z;
+    return zigzag(along + zigzag(across) + zigzag(up));
+}
+
+/// Before cells are so large that they show nothing of a layer, its points fade, each at its place and in its turn. The worst move of a
+/// camera changes three splashes by a p99 of .6, .3 and .5 pixels; by 1.4, .9, 1.5 if blocks lose their layers at once, by
+/// 1.4, .5, .9 without turns but in a narrow band; by 8 if all fade together, for half a point with such neighbours is nothing.
+void fade_layer(const Player& player, uint32_t layer, format::PointSet& points) {
+    constexpr float waves_in_cells = 24, at_once = 0.4f;  // about five points; share of the fade that one point takes
+    const float limit = layer_limit(*player.directory, layer), begin = layer_fades * limit;
+    const float wave = waves_in_cells * player.directory->header.cell_size;
+    const Levels& levels = player.plan.levels_drawn;
+    for (uint32_t i = 0; i < points.count; ++i) {
+        const float place[3] = {points.x[i], points.y[i], points.z[i]}, cell = levels.cell_at(place);
+        if (cell <= begin) continue;
+        const float left = (limit - cell) / (limit - begin);  // of the fade
+        points.activity[i] *= std::clamp((left - turn_at(place, wave) * (1 - at_once)) / at_once, 0.f, 1.f);
+    }
+}
+
 /// Places of tracks that turned out to be no points.
 void leave_out(format::PointSet& points, uint32_t room) {
     for (uint32_t i = points.count; i < room; ++i)
@@ -125,6 +152,7 @@ void run_evaluate(void* context, uint32_t index, uint32_t) {
         leave_out(points, piece.room);
         const format::ChunkRecord& record = player.directory->tables.chunks[piece.chunk];
         cull_points(player.plan, (reach_in_spacings + 1) * record.spacing, points);
+        if (record.layer > 0) fade_layer(player, record.layer, points);
         hand_out_points(e.points, piece.offset, piece.offset + piece.room, *player.frame.target);
     }
 }

@@ -24,6 +24,16 @@ struct Levels {
     float reach[most_views];      ///< a cell may measure 1 / reach of its distance; least_reach at least
 
     float cell(int32_t level) const { return cell_size * float(1u << uint32_t(level)); }
+    /// What cells may measure at a place, never smaller than those of level 0: drawn are the largest of a level that fit.
+    float cell_at(const float place[3]) const {
+        float most = eye_count ? 1e15f : cell_size;
+        for (uint32_t e = 0; e < eye_count; ++e) {
+            float squared = 0;
+            for (int a = 0; a < 3; ++a) squared += (place[a] - eyes[e][a]) * (place[a] - eyes[e][a]);
+            most = std::min(most, std::sqrt(squared) / reach[e]);
+        }
+        return std::max(cell_size, most);
+    }
     /// Only for boxes whose parents are divided, or where that is asked first.
     bool divided(int32_t level, const int32_t tile[3]) const {
         if (level == 0) return false;

@@ -44,6 +44,10 @@ struct Directory {
     uint64_t suggested_resident_bytes;
 };
 double frame_time(const Directory& directory, uint32_t index) noexcept;
+/// Cells from which on the layer adds nothing that they would show: what is coarser is fine enough. Until then it fades,
+/// from `layer_fades` of them on; cells of the source's size have all layers.
+float layer_limit(const Directory& directory, uint32_t layer) noexcept;
+inline constexpr float layer_fades = 0.7f;
 /// Bytes a chunk takes of a player's residency: head, tracks, coefficients; with its read: + bytes.
 uint64_t decoded_bytes(const format::ChunkRecord& chunk) noexcept;
 uint64_t reading_bytes(const format::ChunkRecord& chunk) noexcept;

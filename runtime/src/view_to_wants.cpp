@@ -9,15 +9,12 @@ namespace rill {
 namespace {
 
 constexpr float automatic_pixel_error = 2;  ///< Budget::pixel_error 0
-/// In cells: a layer that leaves so little wrong is fine enough. dam_break from 4 diagonals, cells of 2 pixels: with 1 cell the drawn
-/// surface was off by a p99 of 2.6 pixels for no fewer triangles; with .65 of 1.0 at most, with .5 of .8; but at .6 layers of three
-/// splashes just go on being drawn with cells twice as large, which then take a fifth longer.
-constexpr float most_error = 0.61f;
 constexpr float most_cells_across = 1 << 20;
 /// Wants stay as they are while an eye moves by no more than this share of its distance, and the sizes asked for change by
 /// no more than this many octaves: a camera that trembles asks for nothing new. (What is drawn follows it exactly, without
 /// jumps: cells_to_parents.cpp.)
 constexpr float most_drift = 1 / 8.f;
+constexpr float most_lag = 1.25f;  ///< what cells that are drawn may be smaller than those that wants are for: both drifts
 
 /// World planes and eyes into asset space. The matrix is rotation · scale | translation, so its inverse
 /// is its transpose over scale².
@@ -118,9 +115,8 @@ bool alike(const Levels& a, const Levels& b, const Sight& sight) {
 
 uint32_t layers_for(const Directory& directory, const Frame& frame, float cell_size) {
     const uint32_t count = directory.header.layer_count;
-    uint32_t layers = count;
-    if (cell_size > directory.header.cell_size)
-        for (layers = 1; layers < count && directory.layer_error[layers - 1] > most_error * cell_size;) ++layers;
+    uint32_t layers = 1;
+    while (layers < count && cell_size < layer_limit(directory, layers)) ++layers;
     return frame.budget.layers ? std::min(layers, frame.budget.layers) : layers;
 }
 
@@ -142,10 +138,11 @@ struct BlockLayers {
 BlockLayers layers_of_blocks(const Directory& directory, const Frame& frame, uint32_t window, const Plan& plan) {
     const format::WindowRecord& w = directory.tables.windows[window];
     BlockLayers layers{};
+    const float lag = plan.view_count && frame.budget.cell_size == 0 ? most_lag : 1;
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
         if (!is_seen(plan, chunk)) continue;
-        const uint32_t wanted = layers_for(directory, frame, cell_at(plan.levels_held, chunk));
+        const uint32_t wanted = layers_for(directory, frame, cell_at(plan.levels_held, chunk) / lag);
         layers.count[chunk.block] = uint8_t(std::max<uint32_t>(layers.count[chunk.block], wanted));
     }
     return layers;
