@@ -120,8 +120,11 @@ void find_motion(Window& window, Past past, bool known, bool slip, int jobs) {
 SpanCook::SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan,
                    const CookFacts& facts, const Aim& aim)
     : reader_(reader), settings_(settings), survey_(survey), plan_(plan), facts_(facts), aim_(aim) {
-    tables_memory_.resize(format::basis_tables_bytes(uint32_t(settings.window) + 1) / sizeof(double) + 2);
-    format::build_basis_tables(tables_, tables_memory_.data(), uint32_t(settings.window) + 1);
+    uint32_t longest = 0;
+    for (uint32_t span = 0; span < plan.spans(); ++span)
+        for (uint32_t w = 0; w < plan.windows(span); ++w) longest = std::max(longest, plan.border(span, w + 1) - plan.border(span, w));
+    tables_memory_.resize(format::basis_tables_bytes(longest + 1) / sizeof(double) + 2);
+    format::build_basis_tables(tables_, tables_memory_.data(), longest + 1);
 }
 
 void SpanCook::run(uint32_t span, const std::string& output, const std::function<void(uint32_t)>& done) const {
@@ -185,10 +188,10 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
     result.seconds.assign(info.seconds.begin() + begin, info.seconds.begin() + end + 1);
     std::vector<Path> survivors;
     Past past;
-    for (uint32_t first = begin;; first += plan_.window) {
-        Window window = load(first, std::min(end, first + plan_.window), past, float(tolerance));
-        window.opens_span = first == begin;
-        const uint32_t last = first + uint32_t(window.samples()) - 1;
+    for (uint32_t w = 0, windows = plan_.windows(span); w < windows; ++w) {
+        const uint32_t first = plan_.border(span, w), last = plan_.border(span, w + 1);
+        Window window = load(first, last, past, float(tolerance));
+        window.opens_span = w == 0;
         const WindowGoal goal = goal_for(tolerance * (window.calm ? calm_tolerance : 1), survey_, settings_.jobs);
         grow_tracks(window, survivors, goal);
         const CodedWindow coded = code_tracks(window, goal, tables_);
