@@ -17,8 +17,8 @@ namespace fs = std::filesystem;
 namespace {
 
 void check(const CookSettings& settings) {
-    if (settings.window < 1 || settings.window + 1 > int(format::max_window_samples))
-        throw UsageError("--window must be 1 to " + std::to_string(format::max_window_samples - 1) + " frames");
+    if (settings.window < 0 || settings.window > int(SpanPlan::most_window))
+        throw UsageError("--window must be 1 to " + std::to_string(SpanPlan::most_window) + " frames");
     if (settings.layers < 1 || settings.layers > int(format::max_layers))
         throw UsageError("layers must be 1 to " + std::to_string(format::max_layers));
     if (settings.segments > 0 && settings.segment >= settings.segments) throw UsageError("--segment I/N needs I from 1 to N");
@@ -27,7 +27,8 @@ void check(const CookSettings& settings) {
 
 /// What decides every byte of the asset, but for the input's content.
 nlohmann::json decisive_settings(const CookSettings& settings) {
-    nlohmann::json all = {{"window", settings.window}, {"layers", settings.layers}, {"read", read_settings(settings.read)}};
+    nlohmann::json all = {{"layers", settings.layers}, {"read", read_settings(settings.read)}};
+    if (settings.window > 0) all["window"] = settings.window;
     if (settings.bitrate > 0) all["bitrate"] = settings.bitrate;
     else all["error"] = settings.error;
     if (!settings.slip) all["slip"] = false;
@@ -55,7 +56,8 @@ struct Job {
                                     {"windows_per_span", windows_per_span}, {"format", format::current_version}, {"tool", RILL_VERSION}};
         key = hash_text(all.dump());
         folder = output + ".cook-" + key.substr(0, 16);
-        plan = {uint32_t(reader->info().numbers.size()), uint32_t(settings.window)};
+        const auto count = uint32_t(reader->info().numbers.size());
+        plan = settings.window > 0 ? SpanPlan{count, uint32_t(settings.window), 0} : SpanPlan{count, usual_window, usual_calm_window};
         share = settings.segments > 0 ? segment_of(plan, settings.segment, settings.segments) : SpanRange{0, plan.spans()};
     }
     std::string part(uint32_t span) const {

@@ -16,7 +16,7 @@ namespace rill::cooker {
 struct CookSettings {
     std::string error = "0.25e";   ///< p99 aimed at: "0.25e" median edges, "0.1%" of the diagonal, "2mm", "0.002m"
     double bitrate = 0;            ///< 1000 bits per second, > 0: the best error within this rate, instead of `error`
-    int window = 24;               ///< frames a window spans (it touches one more)
+    int window = 0;                ///< frames a window spans, about (it touches one more); 0: as usual, more where the liquid is calm
     int jobs = 0;                  ///< 0: all cores
     int layers = 4;
     bool slip = true;              ///< keep how the liquid slides along the surface; false: the runtime's velocities are the surface's own

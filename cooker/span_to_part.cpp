@@ -100,11 +100,8 @@ bool go_with_liquid(Window& window, int jobs) {
     return true;
 }
 
-/// How points go from frame to frame. `known`: the velocities are the liquid's own; `slip`: it is kept.
-void find_motion(Window& window, Past past, bool known, bool slip, int jobs) {
-    window.calm = known && go_with_liquid(window, jobs);
-    if (window.calm) return;
-    window.slips = known && slip;
+/// How the surface goes from frame to frame.
+void go_with_surface(Window& window, Past past, int jobs) {
     for (size_t s = 0; s + 1 < window.frames.size(); ++s) {
         const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
         const double seconds = window.seconds[s + 1] - window.seconds[s];
@@ -120,11 +117,9 @@ void find_motion(Window& window, Past past, bool known, bool slip, int jobs) {
 SpanCook::SpanCook(const SequenceReader& reader, const CookSettings& settings, const Survey& survey, const SpanPlan& plan,
                    const CookFacts& facts, const Aim& aim)
     : reader_(reader), settings_(settings), survey_(survey), plan_(plan), facts_(facts), aim_(aim) {
-    uint32_t longest = 0;
-    for (uint32_t span = 0; span < plan.spans(); ++span)
-        for (uint32_t w = 0; w < plan.windows(span); ++w) longest = std::max(longest, plan.border(span, w + 1) - plan.border(span, w));
-    tables_memory_.resize(format::basis_tables_bytes(longest + 1) / sizeof(double) + 2);
-    format::build_basis_tables(tables_, tables_memory_.data(), longest + 1);
+    const uint32_t samples = std::min(SpanPlan::most_window, std::max(2 * plan.window, plan.calm_window)) + 1;
+    tables_memory_.resize(format::basis_tables_bytes(samples) / sizeof(double) + 2);
+    format::build_basis_tables(tables_, tables_memory_.data(), samples);
 }
 
 void SpanCook::run(uint32_t span, const std::string& output, const std::function<void(uint32_t)>& done) const {
@@ -188,10 +183,10 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
     result.seconds.assign(info.seconds.begin() + begin, info.seconds.begin() + end + 1);
     std::vector<Path> survivors;
     Past past;
-    for (uint32_t w = 0, windows = plan_.windows(span); w < windows; ++w) {
-        const uint32_t first = plan_.border(span, w), last = plan_.border(span, w + 1);
-        Window window = load(first, last, past, float(tolerance));
-        window.opens_span = w == 0;
+    for (uint32_t first = begin;;) {
+        Window window = next_window(first, end, past, float(tolerance));
+        window.opens_span = first == begin;
+        const uint32_t last = first + uint32_t(window.samples()) - 1;
         const WindowGoal goal = goal_for(tolerance * (window.calm ? calm_tolerance : 1), survey_, settings_.jobs);
         grow_tracks(window, survivors, goal);
         const CodedWindow coded = code_tracks(window, goal, tables_);
@@ -200,6 +195,7 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
         if (last == end) break;
         survivors = survivors_of(window);
         past = past_of(window);
+        first = last;
     }
     write(writer, result);
     return result;
@@ -211,22 +207,38 @@ void SpanCook::write(AssetWriter& writer, const SpanResult& result) const {
     writer.finish(facts);
 }
 
-Window SpanCook::load(uint32_t first, uint32_t last, Past past, float tolerance) const {
-    Window window;
-    window.first = int(first);
-    window.frames.resize(last - first + 1);
-    for (uint32_t i = first; i <= last; ++i) window.seconds.push_back(reader_.info().seconds[i]);
-    parallel_for(window.frames.size(), settings_.jobs, [&](size_t s) {
+void SpanCook::load(Window& window, uint32_t last, const Past& past, float tolerance) const {
+    const size_t known = window.frames.size(), count = last - uint32_t(window.first) + 1;
+    window.frames.resize(count);
+    for (size_t s = known; s < count; ++s) window.seconds.push_back(reader_.info().seconds[size_t(window.first) + s]);
+    parallel_for(count - known, settings_.jobs, [&](size_t k) {
+        const size_t s = known + k;
         if (s == 0 && past.border) {
             window.frames[s] = past.border;
             return;
         }
-        Mesh mesh = reader_.read(first + s);
+        Mesh mesh = reader_.read(size_t(window.first) + s);
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });
-    find_motion(window, std::move(past), !reader_.info().velocity_estimated, settings_.slip, settings_.jobs);
-    return window;
+}
+
+Window SpanCook::next_window(uint32_t first, uint32_t span_end, const Past& past, float tolerance) const {
+    const bool velocity_known = !reader_.info().velocity_estimated;
+    Window window;
+    window.first = int(first);
+    load(window, plan_.window_end(first, span_end), past, tolerance);
+    window.calm = velocity_known && go_with_liquid(window, settings_.jobs);
+    if (!window.calm) {
+        window.slips = velocity_known && settings_.slip;
+        go_with_surface(window, past, settings_.jobs);
+        return window;
+    }
+    const uint32_t later = plan_.calm_window_end(first, span_end);
+    if (later == plan_.window_end(first, span_end)) return window;
+    Window longer = window;
+    load(longer, later, past, tolerance);
+    return go_with_liquid(longer, settings_.jobs) ? longer : window;
 }
 
 }  // namespace rill::cooker

@@ -40,7 +40,10 @@ private:
     std::vector<size_t> judged_frames_of(uint32_t span) const;
     SpanResult cook(uint32_t span, const std::string& output, double tolerance, const std::function<void(uint32_t)>& done) const;
     void write(AssetWriter& writer, const SpanResult& result) const;
-    Window load(uint32_t first, uint32_t last, Past past, float tolerance) const;
+    /// From `first` on, and how its points go: longer where the liquid is calm.
+    Window next_window(uint32_t first, uint32_t span_end, const Past& past, float tolerance) const;
+    /// The frames of the window that it has not got yet, up to `last`.
+    void load(Window& window, uint32_t last, const Past& past, float tolerance) const;
 
     const SequenceReader& reader_;
     const CookSettings& settings_;

@@ -91,6 +91,28 @@ TEST_CASE("spans cover every frame, share their borders, and none is tiny") {
         }
 }
 
+TEST_CASE("windows fill a span and are of even length; calm ones are longer, but not too long") {
+    for (uint32_t window : {1u, 3u, 24u, 64u})
+        for (uint32_t steps = 1; steps < 600; ++steps) {
+            const SpanPlan plan{steps + 1, window, window == usual_window ? usual_calm_window : 0};
+            CAPTURE(window);
+            CAPTURE(steps);
+            uint32_t shortest = UINT32_MAX, longest = 0;
+            for (uint32_t begin = 0, end; begin < steps; begin = end) {
+                end = plan.window_end(begin, steps);
+                REQUIRE((end > begin && end <= steps));
+                shortest = std::min(shortest, end - begin), longest = std::max(longest, end - begin);
+                const uint32_t calm = plan.calm_window_end(begin, steps);
+                REQUIRE((calm >= end && calm <= steps && calm - begin <= std::max(end - begin, plan.calm_window)));
+            }
+            REQUIRE(longest - shortest <= 1);
+            REQUIRE((longest <= SpanPlan::most_window && 2 * longest <= 3 * window));
+            if (steps >= window && window < SpanPlan::most_window) REQUIRE(3 * shortest >= 2 * window - 2);
+        }
+    CHECK(SpanPlan{100, 24, 48}.calm_window_end(0, 96) == 48);
+    CHECK(SpanPlan{100, 24, 0}.calm_window_end(0, 96) == 24);
+}
+
 TEST_CASE("segments, linked in any order, are the asset that one machine makes") {
     Clip clip;
     REQUIRE(SpanPlan{frames, 1}.spans() == 3);

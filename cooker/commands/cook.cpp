@@ -123,7 +123,7 @@ void add_cook(CLI::App& app, Run& run) {
     CLI::Option* error = command->add_option("--error", options->settings.error, "p99 error aimed at: 0.25e (edges), 0.1% (of the diagonal), 2mm")->capture_default_str();
     command->add_option("--bitrate", options->settings.bitrate, "Kilobits per second: the best error within this rate, instead of --error")->check(CLI::PositiveNumber)->excludes(error);
     command->add_option("--frames", options->frames, "A:B[:STEP], source numbers, inclusive");
-    command->add_option("--window", options->settings.window, "Frames per window, about: they are of even length")->check(CLI::Range(1, 64))->capture_default_str();
+    command->add_option("--window", options->settings.window, "Frames per window, about, for they are of even length [24; where the liquid is calm up to 48]")->check(CLI::Range(1, 64));
     command->add_option("--layers", options->settings.layers, "Layers of detail")->check(CLI::Range(1, 8))->capture_default_str();
     command->add_option("--slip", options->settings.slip, "Keep how the liquid slides along the surface, for velocity; false: a few per cent smaller")->capture_default_str();
     command->add_option("--jobs", options->settings.jobs, "Threads; 0: all cores")->check(CLI::Range(0, 1024));
