@@ -48,7 +48,7 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
                   uint32_t layers, bool ends_span, SpanResult& account) {
     std::vector<float> cost;
     for (const QuantisedTrack& track : coded.tracks) cost.push_back(rough_bits(track));
-    const auto [layer, errors] = assign_layers(window, coded.decoded, cost, layers, goal.jobs);
+    const Layers layered = assign_layers(window, coded.decoded, cost, layers, goal.jobs);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(coded.decoded, most_tracks_per_block, block_count);
     std::vector<ChunkToWrite> chunks(size_t(layers) * block_count);
@@ -57,11 +57,11 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
         chunk.layer = uint32_t(c) / block_count, chunk.block = uint32_t(c) % block_count;
         std::vector<QuantisedTrack> tracks;
         std::vector<const TrackSamples*> decoded;
-        for (size_t i = 0; i < layer.size(); ++i)
-            if (layer[i] == chunk.layer && block[i] == chunk.block)
+        for (size_t i = 0; i < block.size(); ++i)
+            if (layered.layer[i] == chunk.layer && block[i] == chunk.block)
                 tracks.push_back(coded.tracks[i]), decoded.push_back(&coded.decoded[i]);
         if (tracks.empty()) return;
-        const LayerError& error = errors[chunk.layer];
+        const LayerError& error = layered.error[chunk.layer];
         chunk.spacing = error.spacing, chunk.error_mean = error.mean, chunk.error_p99 = error.p99;
         bound(chunk, decoded, 1.5f * error.spacing);
         chunk.encoded = encode_chunk(tracks, coded.quantiser, goal.origin, uint32_t(window.samples()), {});
