@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Progressive order: every prefix of layers is a surface of its own in every frame of the window, the best we know
 // of its size. The decoder is in the loop: what has been taken so far is decoded, what it leaves wrong at the
-// tracks still to come says which of them are worth their bytes, over their whole lives.
+// tracks still to come says which of them are worth their bytes, over their whole lives. Layer 0 is a share of the
+// cost; the others take tracks until what they leave wrong is too little for their cells to show.
 #include <algorithm>
 #include <cmath>
 #include <numeric>

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 
 #include "error_target.h"
 #include "frames_to_tracks.h"
@@ -80,23 +81,25 @@ Past past_of(const Window& window) {
     return {window.frames[last - 1], window.frames[last], window.motion.back(), window.seconds[last] - window.seconds[last - 1]};
 }
 
-/// Fills in the liquid's own motion, if the whole window is calm enough for points to go with it.
+/// Goes on with the liquid's own motion through the frames that the window has none for, if all of them are calm enough for points to
+/// go with it.
 bool go_with_liquid(Window& window, int jobs) {
-    std::vector<std::vector<glm::vec3>> motion(window.frames.size() - 1);
-    const double steps = double(motion.size());
+    const size_t known = window.motion.size(), end = window.frames.size() - 1;
+    const double steps = double(end - known);
+    std::vector<std::vector<glm::vec3>> motion(end - known);
     double stretch = 0, miss = 0;
-    for (size_t s = 0; s < motion.size(); ++s) {
+    for (size_t s = known; s < end; ++s) {
         const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
-        motion[s] = liquid_motion(from.mesh, to.mesh, to.index, window.seconds[s + 1] - window.seconds[s], jobs);
-        stretch += mean_stretch(from.mesh, motion[s]);
+        motion[s - known] = liquid_motion(from.mesh, to.mesh, to.index, window.seconds[s + 1] - window.seconds[s], jobs);
+        stretch += mean_stretch(from.mesh, motion[s - known]);
         if (stretch > most_stretch * steps) return false;
     }
-    for (size_t s = 0; s < motion.size(); ++s) {
+    for (size_t s = known; s < end; ++s) {
         const SurfaceFrame &from = *window.frames[s], &to = *window.frames[s + 1];
-        miss += mean_miss(from.mesh, motion[s], to.index, 2 * to.edge, jobs) / to.edge;
+        miss += mean_miss(from.mesh, motion[s - known], to.index, 2 * to.edge, jobs) / to.edge;
     }
     if (miss > most_miss * steps) return false;
-    window.motion = std::move(motion);
+    std::move(motion.begin(), motion.end(), std::back_inserter(window.motion));
     return true;
 }
 

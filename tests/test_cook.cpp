@@ -176,18 +176,23 @@ TEST_CASE("layers: closed from the first on, nearer with each, and cheap first")
 TEST_CASE("the last layer but one is as fine as cells of two edges can show, and not much finer") {
     const AssetDirectory directory = read_directory(whole().asset);
     const float shown = rill::format::fine_enough * 2 * directory.header.cell_size;
+    size_t count = 0;
     for (const auto& chunk : directory.chunks) {
         if (chunk.layer != 1) continue;
+        ++count;
         CHECK(chunk.error_p99 <= shown);
         CHECK(chunk.error_p99 > 0.3f * shown);
     }
+    CHECK(count >= directory.windows.size());
 }
 
 TEST_CASE("at a window's border nothing pops: either side is within the coding error of the same frame") {
     AssetPlayer player(whole().asset);
-    for (int border : {3, 6}) {
-        CAPTURE(border);
-        const double t = border / fps, nearly = 1e-6;
+    const AssetDirectory directory = read_directory(whole().asset);
+    REQUIRE(directory.windows.size() > 1);
+    for (size_t w = 1; w < directory.windows.size(); ++w) {
+        CAPTURE(w);
+        const double t = directory.windows[w].first_sample / fps, nearly = 1e-6;
         const Mesh before = player.mesh(t - nearly), after = player.mesh(t + nearly);
         CHECK(distance(before, after).p99 < 2 * whole().report.target_p99);
     }

@@ -17,6 +17,15 @@ inline constexpr int tile_cells = 8;
 /// reach / 2 < √3 · tile_cells / 2: from here on tiles that touch differ by one level at most.
 inline constexpr float least_reach = 16;
 
+inline float distance_to_box(const float x[3], const float lower[3], const float upper[3]) {
+    float squared = 0;
+    for (int a = 0; a < 3; ++a) {
+        const float d = std::max({lower[a] - x[a], x[a] - upper[a], 0.f});
+        squared += d * d;
+    }
+    return std::sqrt(squared);
+}
+
 struct Levels {
     float cell_size;              ///< of level 0, asset space
     uint32_t eye_count;           ///< 0: level 0 everywhere
@@ -24,14 +33,11 @@ struct Levels {
     float reach[most_views];      ///< a cell may measure 1 / reach of its distance; least_reach at least
 
     float cell(int32_t level) const { return cell_size * float(1u << uint32_t(level)); }
-    /// What cells may measure at a place, never smaller than those of level 0: drawn are the largest of a level that fit.
-    float cell_at(const float place[3]) const {
+    /// What cells may measure in the nearest part of a box, never smaller than those of level 0: drawn are the largest of a
+    /// level that fit.
+    float cell_at(const float lower[3], const float upper[3]) const {
         float most = eye_count ? 1e15f : cell_size;
-        for (uint32_t e = 0; e < eye_count; ++e) {
-            float squared = 0;
-            for (int a = 0; a < 3; ++a) squared += (place[a] - eyes[e][a]) * (place[a] - eyes[e][a]);
-            most = std::min(most, std::sqrt(squared) / reach[e]);
-        }
+        for (uint32_t e = 0; e < eye_count; ++e) most = std::min(most, distance_to_box(eyes[e], lower, upper) / reach[e]);
         return std::max(cell_size, most);
     }
     /// Only for boxes whose parents are divided, or where that is asked first.

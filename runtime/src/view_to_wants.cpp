@@ -14,7 +14,9 @@ constexpr float most_cells_across = 1 << 20;
 /// no more than this many octaves: a camera that trembles asks for nothing new. (What is drawn follows it exactly, without
 /// jumps: cells_to_parents.cpp.)
 constexpr float most_drift = 1 / 8.f;
-constexpr float most_lag = 1.25f;  ///< what cells that are drawn may be smaller than those that wants are for: both drifts
+/// By so much cells may then be drawn smaller than those that wants are for: both drifts together. A layer is wanted until it has
+/// faded from what is drawn, too.
+constexpr float most_lag = 1.25f;
 
 /// World planes and eyes into asset space. The matrix is rotation · scale | translation, so its inverse
 /// is its transpose over scale².
@@ -45,23 +47,6 @@ bool is_seen(const Plan& plan, const format::ChunkRecord& chunk) {
     return false;
 }
 
-float distance_to(const float* x, const format::ChunkRecord& chunk) {
-    float squared = 0;
-    for (int a = 0; a < 3; ++a) {
-        const float d = std::max({chunk.lower[a] - x[a], x[a] - chunk.upper[a], 0.0f});
-        squared += d * d;
-    }
-    return std::sqrt(squared);
-}
-
-/// Cells that the nearest part of the chunk is drawn with.
-float cell_at(const Levels& levels, const format::ChunkRecord& chunk) {
-    float most = levels.eye_count ? 1e15f : levels.cell_size;
-    for (uint32_t e = 0; e < levels.eye_count; ++e)
-        most = std::min(most, distance_to(levels.eyes[e], chunk) / levels.reach[e]);
-    return std::max(levels.cell_size, most);
-}
-
 /// Distance of each eye from what it sees, infinite where it sees nothing.
 struct Sight {
     float nearest[most_views];
@@ -75,7 +60,7 @@ Sight look(const Directory& directory, const Plan& plan) {
         for (uint32_t v = 0; v < plan.view_count; ++v) {
             if (!touches(plan.views[v], chunk.lower, chunk.upper, reach_in_spacings * chunk.spacing)) continue;
             // Nearer than a cell the eye is in the surface: no cell is small enough.
-            const float distance = std::max(distance_to(plan.eyes[v], chunk), directory.header.cell_size);
+            const float distance = std::max(distance_to_box(plan.eyes[v], chunk.lower, chunk.upper), directory.header.cell_size);
             sight.nearest[v] = std::min(sight.nearest[v], distance);
         }
     }
@@ -138,11 +123,11 @@ struct BlockLayers {
 BlockLayers layers_of_blocks(const Directory& directory, const Frame& frame, uint32_t window, const Plan& plan) {
     const format::WindowRecord& w = directory.tables.windows[window];
     BlockLayers layers{};
-    const float lag = plan.view_count && frame.budget.cell_size == 0 ? most_lag : 1;
+    const float lag = plan.levels_held.eye_count ? most_lag : 1;
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
         if (!is_seen(plan, chunk)) continue;
-        const uint32_t wanted = layers_for(directory, frame, cell_at(plan.levels_held, chunk) / lag);
+        const uint32_t wanted = layers_for(directory, frame, plan.levels_held.cell_at(chunk.lower, chunk.upper) / lag);
         layers.count[chunk.block] = uint8_t(std::max<uint32_t>(layers.count[chunk.block], wanted));
     }
     return layers;
@@ -239,7 +224,7 @@ float smallest_cell(const Directory& directory, const Plan& plan, const Levels& 
     float smallest = levels.cell(levels.coarsest()), cell = levels.cell_size;
     for (uint32_t k = 0; k < w.chunk_count; ++k) {
         const format::ChunkRecord& chunk = directory.tables.chunks[w.first_chunk + k];
-        if (is_seen(plan, chunk)) smallest = std::min(smallest, cell_at(levels, chunk));
+        if (is_seen(plan, chunk)) smallest = std::min(smallest, levels.cell_at(chunk.lower, chunk.upper));
     }
     while (2 * cell <= smallest) cell *= 2;  // the largest power of two that fits: what Levels::divided() comes to
     return cell;
