@@ -150,7 +150,7 @@ void fill_frame(Window& window, int sample, const WindowGoal& goal) {
     for (int round = 0;; ++round) {
         Sweep sweep = alive_at(window, sample);
         Residual residual = measure_residual(frame, sweep.points, goal.jobs);
-        correct_paths(frame, residual, sweep.points, sweep.ids, sample, credible * goal.tolerance, window.paths);
+        correct_paths(frame, residual, sweep.points, sweep.ids, sample, credible * goal.tolerance, window.paths, goal.jobs);
         if (last) break;
         sweep = alive_at(window, sample);
         residual = measure_residual(frame, sweep.points, goal.jobs);

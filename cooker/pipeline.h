@@ -100,7 +100,7 @@ std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vec
 /// tilts, by the weighted mean residual around it. Residuals beyond `credible` metres are another sheet's, or for a
 /// birth to mend. `points` and `ids`: as measured, and which path each is.
 void correct_paths(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
-                   const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths);
+                   const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths, int jobs = 1);
 
 /// Of a layer and all coarser ones, against the source over a window: metres.
 struct LayerError {
