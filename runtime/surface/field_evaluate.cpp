@@ -92,7 +92,7 @@ struct Evaluation {
         if (candidate_count)
             doubts = f.kernels->blend(f, candidates, candidate_count, list, listed, trusted_value, batch);
         else
-            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported, batch.weight[l] = 0;
+            for (uint32_t l = 0; l < lanes; ++l) batch.value[l] = batch.u2[l] = unsupported;
         if (listed > most_listed && n > 1) {
             // A crowd: one by one, so that what each leaves out depends on itself alone.
             for (uint32_t l = 0; l < n; ++l) run(x + l, y + l, z + l, 1, first + l);

@@ -16,7 +16,7 @@ inline constexpr float nowhere = 1e12f;           // place of what fills whole s
 /// Sixteen positions and what was found there.
 struct alignas(64) Batch {
     float x[lanes], y[lanes], z[lanes];
-    float value[lanes], weight[lanes];  ///< weight 0: nothing reaches here, value is `unsupported`
+    float value[lanes];                 ///< `unsupported`: nothing reaches here
     float sign[lanes];                  ///< 1: the value is that of cluster A, −1: of B, 0: of none
     float u2[lanes];  ///< least of any patch; `unsupported` for none: in a thin sheet the nearest may be of the other face
     float nx[lanes], ny[lanes], nz[lanes];  ///< normal of the nearest point

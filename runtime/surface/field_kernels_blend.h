@@ -22,11 +22,14 @@ RILL_INLINE float weight_of(float u2, float activity) {
     const float c = greater(1 - u2, 0);
     return activity * (c * c * c) * inverse_of<fused>(u2 + soften);
 }
-/// Half its derivative by u².
+/// Of slopes: the same, softer, and half its derivative by u².
+struct SlopeWeight {
+    float weight, half_slope;
+};
 template <bool fused>
-RILL_INLINE float weight_slope_of(float u2, float activity) {
-    const float c = greater(1 - u2, 0), s = inverse_of<fused>(u2 + soften);
-    return -0.5f * activity * (c * c) * s * madd<fused>(c, s, 3);
+RILL_INLINE SlopeWeight slope_weight_of(float u2, float activity) {
+    const float c = greater(1 - u2, 0), s = inverse_of<fused>(u2 + soften_slopes), share = activity * (c * c) * s;
+    return {share * c, -0.5f * share * madd<fused>(c, s, 3)};
 }
 RILL_INLINE float weight_b_of(float u2, float w, float agree) {
     const float apart = agree < opposed ? w : 0.f;
@@ -218,16 +221,15 @@ RILL_INLINE uint32_t blend(const Field& f, const uint32_t* candidates, uint32_t 
         value_a[l] = a, value_b[l] = mean_b, take[l] = of_b > 0 ? gain : 0.f;
     }
     for (uint32_t l = 0; l < lanes; ++l) b.value[l] = take[l] > 0 ? value_b[l] : value_a[l];
-    for (uint32_t l = 0; l < lanes; ++l) b.weight[l] = take[l] > 0 ? sums.weight_b[l] : sums.weight_a[l];
     for (uint32_t l = 0; l < lanes; ++l) b.sign[l] = take[l] > 0 ? -1.f : sums.weight_a[l] > 0 ? 1.f : 0.f;
     const uint32_t doubts = find_doubts<fused>({sums.all, sums.sum, sums.square, sums.inside, sums.voters, inverse}, trusted_value, b);
     return doubts ? confirm_doubts<fused>(f, list, count, b, doubts) : 0;
 }
 
-/// Of the chosen cluster: Σ w ∇G + ripple (G − value) ∇w, and Σ w v.
+/// Of the chosen cluster, over Σ w: Σ w ∇G + ripple (G − value) ∇w, and Σ w v; w are the weights of slopes.
 template <bool fused>
 RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, bool velocity, Slopes& out) {
-    alignas(64) float gx[lanes] = {}, gy[lanes] = {}, gz[lanes] = {}, vx[lanes] = {}, vy[lanes] = {}, vz[lanes] = {};
+    alignas(64) float weight[lanes] = {}, gx[lanes] = {}, gy[lanes] = {}, gz[lanes] = {}, vx[lanes] = {}, vy[lanes] = {}, vz[lanes] = {};
     for (uint32_t c = 0; c < count; ++c) {
         const uint32_t j = list[c];
         const Patch p = f.patches[j];
@@ -239,10 +241,12 @@ RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, con
             const float lean = flatten * h, u2 = madd<fused>(lean, h, d2) * p.inverse;
             const float agree = dot<fused>(p.nx, p.ny, p.nz, b.nx[l], b.ny[l], b.nz[l]), gate = gate_of<fused>(agree);
             const float keep = b.sign[l] < 0 ? weight_b_of(u2, 1, agree) : gate * gate;
-            const float w = keep * weight_of<fused>(u2, p.activity), slope = keep * weight_slope_of<fused>(u2, p.activity) * steep;
+            const SlopeWeight of = slope_weight_of<fused>(u2, p.activity);
+            const float w = keep * of.weight, slope = keep * of.half_slope * steep;
             const float hx = dot<fused>(xx, p.xy, p.xz, rx, ry, rz), hy = dot<fused>(p.xy, yy, p.yz, rx, ry, rz),
                         hz = dot<fused>(p.xz, p.yz, zz, rx, ry, rz);
             const float k = slope * madd<fused>(0.5f, dot<fused>(rx, ry, rz, hx, hy, hz), h - b.value[l]);
+            weight[l] += w;
             gx[l] = madd<fused>(w, p.nx + hx, madd<fused>(k, madd<fused>(lean, p.nx, rx), gx[l]));
             gy[l] = madd<fused>(w, p.ny + hy, madd<fused>(k, madd<fused>(lean, p.ny, ry), gy[l]));
             gz[l] = madd<fused>(w, p.nz + hz, madd<fused>(k, madd<fused>(lean, p.nz, rz), gz[l]));
@@ -250,7 +254,7 @@ RILL_INLINE void slope(const Field& f, const uint32_t* list, uint32_t count, con
         }
     }
     for (uint32_t l = 0; l < lanes; ++l) {
-        const float share = b.weight[l] > 0 ? 1 / b.weight[l] : 0.f;
+        const float share = weight[l] > 0 ? 1 / weight[l] : 0.f;
         out.gx[l] = gx[l] * share, out.gy[l] = gy[l] * share, out.gz[l] = gz[l] * share;
         out.vx[l] = vx[l] * share, out.vy[l] = vy[l] * share, out.vz[l] = vz[l] * share;
     }
