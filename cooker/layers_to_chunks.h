@@ -35,7 +35,7 @@ struct Quantiser {
 };
 /// Integers on the lattice of a Quantiser.
 struct QuantisedTrack {
-    uint8_t birth, death, flags;      ///< flags: TrackFlags | format::track_fine
+    uint8_t birth, death, flags;      ///< flags: TrackFlags | format::track_fine | format::track_slips_along
     bool drop;
     int32_t lattice[3];               ///< mean position / tangential step, from the origin
     int32_t axis[2];                  ///< mean normal, octahedral (points)

@@ -4,12 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/lattice.h"
 #include "parallel.h"
 
 namespace rill::cooker {
 namespace {
 
 constexpr uint32_t most_tracks_per_block = 3000;
+// Samples of a life whose slip is left to the neighbours: more than half of all tracks, on an eighth of the surface. Bytes of
+// dam_break and pour_sphere −1.8 %, the direction of velocities 1° worse. (Lives of a single sample not, for they have no motion
+// and their slip is all of their velocity: −1.0 %, .8°. Up to eight samples: −2.2 %.)
+constexpr int most_brief = 5;
 
 void add(ChunkBits& sum, const ChunkBits& more) {
     sum.structure += more.structure, sum.births += more.births, sum.motion += more.motion;
@@ -58,8 +63,10 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
         std::vector<QuantisedTrack> tracks;
         std::vector<const TrackSamples*> decoded;
         for (size_t i = 0; i < block.size(); ++i)
-            if (layered.layer[i] == chunk.layer && block[i] == chunk.block)
+            if (layered.layer[i] == chunk.layer && block[i] == chunk.block) {
                 tracks.push_back(coded.tracks[i]), decoded.push_back(&coded.decoded[i]);
+                if (tracks.back().death - tracks.back().birth < most_brief) tracks.back().flags |= format::track_slips_along;
+            }
         if (tracks.empty()) return;
         const LayerError& error = layered.error[chunk.layer];
         chunk.spacing = error.spacing, chunk.error_mean = error.mean, chunk.error_p99 = error.p99;

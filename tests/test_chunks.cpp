@@ -341,6 +341,65 @@ TEST_CASE("slip: along the surface, within its step; cheaper where neighbours sa
     CHECK_THROWS_AS(quantise_track(wild, quantiser, origin, tables()), InputError);
 }
 
+TEST_CASE("slip left to the neighbours: next to no bits, and near what it would be") {
+    std::mt19937 random(5);
+    std::vector<QuantisedTrack> tracks;
+    for (int i = 0; i < 800; ++i) {
+        TrackSamples track = make_track(random, i % 2 ? 10 : 0, i % 2 ? 12 : window - 1, false);
+        const glm::vec3& x = track.position[0];
+        track.slip = {2 * (x.y - origin.y), -2 * (x.x - origin.x), 0};
+        tracks.push_back(quantise_track(track, quantiser, origin, tables()));
+    }
+    const double all = encode(tracks).bits.slip;
+    double off = 0, size = 0;
+    for (size_t i = 0; i < tracks.size(); ++i)
+        if (i % 2) tracks[i].flags |= format::track_slips_along;
+    const EncodedChunk chunk = encode(tracks);
+    CHECK(chunk.bits.slip < 0.7 * all);
+    const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
+    REQUIRE(d.status == Status::ok);
+    // Whichever of the quantised tracks each is: nothing but slip has changed.
+    const auto expected = expected_numbers(tracks), found = all_numbers(d.block);
+    const auto without_slip = [](std::vector<float> n) { return n.erase(n.begin() + 6, n.begin() + 9), n; };
+    size_t own = 0;
+    std::vector<std::vector<float>> a, b;
+    for (const auto& n : expected) a.push_back(without_slip(n));
+    for (const auto& n : found) b.push_back(without_slip(n));
+    std::sort(a.begin(), a.end()), std::sort(b.begin(), b.end());
+    CHECK(a == b);
+    for (const auto& n : found) own += std::binary_search(expected.begin(), expected.end(), n);
+    CHECK(own >= tracks.size() / 2);
+    CHECK(own < tracks.size());
+    for (uint32_t i = 0; i < d.block.point_count; ++i) {
+        const format::Track& track = d.block.tracks[i];
+        const float* mean = d.block.coefficients + track.first_coefficient;  // of the origin's, √samples times
+        const glm::vec2 x = glm::vec2(mean[0], mean[1]) / std::sqrt(float(track.death - track.birth + 1));
+        const glm::vec3 slip = d.block.slip_unit * glm::vec3(track.slip[0], track.slip[1], track.slip[2]);
+        off += glm::distance(glm::vec2(slip), 2.f * glm::vec2(x.y, -x.x)), size += 2 * glm::length(x);
+    }
+    CHECK(off < 0.25 * size);
+}
+
+TEST_CASE("slip left to the neighbours is its own where there are none, and never too large") {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> unit(-1, 1);
+    TrackSamples wild = make_track(random, 0, window - 1, false);
+    wild.slip = {1e6f, -1e6f, 1e6f};
+    std::vector<QuantisedTrack> tracks;
+    for (int i = 0; i < 200; ++i) {  // frames turn every way: what fits along two axes is too long along one
+        const glm::vec3 normal = glm::normalize(glm::vec3(unit(random), unit(random), unit(random)));
+        std::fill(wild.normal.begin(), wild.normal.end(), normal);
+        tracks.push_back(quantise_track(wild, quantiser, origin, tables()));
+        if (i % 3) tracks.back().flags |= format::track_slips_along;
+    }
+    const EncodedChunk chunk = encode(tracks);
+    CHECK(decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape).status == Status::ok);
+    tracks.resize(2), tracks.erase(tracks.begin());
+    REQUIRE((tracks[0].flags & format::track_slips_along) != 0);
+    const EncodedChunk lone = encode(tracks);
+    CHECK(all_numbers(decode(lone.bytes.data(), lone.bytes.size(), lone.shape).block) == expected_numbers(tracks));
+}
+
 TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact velocity") {
     std::mt19937 random(2);
     std::vector<TrackSamples> truth;

@@ -31,7 +31,9 @@ bool ChunkModel<Coder>::slip(RawTrack& t, const Frame& frame, const RawTrack* so
         const uint32_t own = magnitude_class(magnitude(guess)), before = magnitude_class(sum);
         const Contexts context = {16 * (c ? 1 + (sum > 0) : 0) + expected, 7 * at_most(before, 6) + at_most(own, 6),
                                   5 * spread + at_most(length, 4), 6 * spread + at_most(before, 5)};
-        const int32_t delta = signed_value(sliding, context, source ? source->slip[c] - guess : 0);
+        int32_t wanted = source ? source->slip[c] : 0;
+        if (source && source->flags & track_slips_along && near.count) wanted = guess < -max_slip ? -max_slip : guess > max_slip ? max_slip : guess;
+        const int32_t delta = signed_value(sliding, context, wanted - guess);
         sum += magnitude(delta);
         t.slip[c] = guess + delta;
         if (magnitude(t.slip[c]) > uint32_t(max_slip)) {

@@ -28,6 +28,8 @@ inline constexpr double position_gain = 0.75, normal_gain = 0.75;
 
 /// Only between coder and lattice: tangential steps equal the step (the normal turns far over the life).
 inline constexpr uint8_t track_fine = 8;
+/// Only of tracks to be encoded: their slip becomes what the neighbours foretell, which is the cheapest.
+inline constexpr uint8_t track_slips_along = 16;
 inline constexpr int32_t max_symbol = 1 << 20;  ///< no stored integer is larger
 inline constexpr int32_t max_mean = 1 << 30;    ///< likewise mean positions, in step/16
 inline constexpr int32_t max_slip = 44;         ///< likewise slip: both at once fit Track::slip
@@ -36,7 +38,7 @@ inline constexpr int32_t max_slip = 44;         ///< likewise slip: both at once
 /// lattice point; second [term][t1, t2, n], term 0 unused (the mean normal is the axis). Drops: position
 /// [term][xyz] likewise, second [term][6].
 struct RawTrack {
-    uint8_t birth, death, flags;  ///< flags: TrackFlags | track_fine
+    uint8_t birth, death, flags;  ///< flags: TrackFlags | track_fine | track_slips_along
     uint8_t position_terms, second_terms;
     int32_t lattice[3];  ///< tangential steps from the origin
     int32_t axis[2];     ///< octahedral, |u|, |v| ≤ axis_levels
