@@ -32,7 +32,8 @@ bool ChunkModel<Coder>::slip(RawTrack& t, const Frame& frame, const RawTrack* so
         const Contexts context = {16 * (c ? 1 + (sum > 0) : 0) + expected, 7 * at_most(before, 6) + at_most(own, 6),
                                   5 * spread + at_most(length, 4), 6 * spread + at_most(before, 5)};
         int32_t wanted = source ? source->slip[c] : 0;
-        if (source && source->flags & track_slips_along && near.count) wanted = guess < -max_slip ? -max_slip : guess > max_slip ? max_slip : guess;
+        if (source && source->flags & track_slips_along && magnitude(wanted - guess) <= slips_along_within)
+            wanted = guess < -max_slip ? -max_slip : guess > max_slip ? max_slip : guess;
         const int32_t delta = signed_value(sliding, context, wanted - guess);
         sum += magnitude(delta);
         t.slip[c] = guess + delta;
