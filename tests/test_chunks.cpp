@@ -342,7 +342,7 @@ TEST_CASE("slip: along the surface, within its step; cheaper where neighbours sa
     CHECK_THROWS_AS(quantise_track(wild, quantiser, origin, tables()), InputError);
 }
 
-TEST_CASE("slip left to the neighbours: next to no bits, and no more than two steps off") {
+TEST_CASE("slip left to the neighbours: fewer bits, and no more than two steps off") {
     std::mt19937 random(5);
     std::vector<QuantisedTrack> tracks;
     for (int i = 0; i < 800; ++i) {

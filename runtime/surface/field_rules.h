@@ -41,11 +41,11 @@ constexpr float gate_scale = 1 / (agreeing - opposed);
 constexpr float opposed_reach = 0.25f;  // cluster B has weight only within R/2 (R/1.7 +.8 %, R/2.4 +.5 %)
 constexpr float soften = 0.03f;         // of u² in the weight: how far the blend is from going through each point (1e-4
                                         // +2 %, and normals .2° worse; .1 +2.5 %)
-// The gradient is blended by itself: softer (`soften_slopes`), with patches of another face fading out later (the gate not
-// squared), and with `ripple` of the weights' own slope, for that is the waves between patches that disagree, of which the
-// liquid has none. Normals then are 5, 5 and 3 % nearer to the source's (dam_break, pour_sphere, drop_splash) than with the
-// weights of the value and .65 of their slope, which are 13 % nearer than the exact gradient; softer by .03, .1 and .2: 0, 4
-// and 2 % nearer. Steps to the surface do not mind.
+// The gradient is blended by itself: softer (`soften_slopes`), and with `ripple` of the weights' own slope, for that is the
+// waves between patches that disagree, of which the liquid has none. Normals then are 5, 5 and 3 % nearer to the source's
+// (dam_break, pour_sphere, drop_splash) than with the weights of the value and .65 of their slope, which are 13 % nearer than
+// with the exact gradient. Steps to the surface do not mind. (Softer by .2, other powers: cooker/README.md, "How the surface is
+// fitted".)
 constexpr float soften_slopes = 0.08f, ripple = 0.77f;
 // The fit of a patch (field_kernels_fit.h).
 constexpr float support_scale = 1.4f;   // R, of the distance to the sixth neighbour
