@@ -11,14 +11,25 @@ namespace rill::cooker {
 namespace {
 
 constexpr uint32_t most_tracks_per_block = 3000;
-// Samples of a life whose slip may be its neighbours': of more than half of all tracks, on an eighth of the surface. Bytes of
-// dam_break and pour_sphere −1.2 and −1.4 %, the direction of velocities .7 and .9° worse. However far the neighbours are off: −1.8 %,
-// 1°, but where most lives are that brief, each copies what the one before copied. Up to eight samples: −1.6 and −1.8 %.
+// Samples of a life whose slip may be its neighbours', as long as such lives carry no more than this share of the surface, over time:
+// where most are that brief, each copies what the one before copied. Bytes of dam_break and pour_sphere −1.2 %, the direction of
+// velocities .7 and .8° worse. However far the neighbours are off: −1.8 %, 1°. Up to eight samples: −1.6 and −1.8 %.
 constexpr int most_brief = 5;
+constexpr double most_brief_share = 0.25;
 
 void add(ChunkBits& sum, const ChunkBits& more) {
     sum.structure += more.structure, sum.births += more.births, sum.motion += more.motion;
     sum.normals += more.normals, sum.slip += more.slip, sum.drops += more.drops;
+}
+
+bool is_brief(const QuantisedTrack& track) { return track.death - track.birth < most_brief; }
+bool few_are_brief(const std::vector<QuantisedTrack>& tracks) {
+    double brief = 0, all = 0;  // samples
+    for (const QuantisedTrack& track : tracks) {
+        const int life = track.death - track.birth + 1;
+        all += life, brief += is_brief(track) ? life : 0;
+    }
+    return brief <= most_brief_share * all;
 }
 
 /// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
@@ -56,6 +67,7 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
     const Layers layered = assign_layers(window, coded.decoded, cost, layers, goal.jobs);
     uint32_t block_count = 0;
     const std::vector<uint32_t> block = assign_blocks(coded.decoded, most_tracks_per_block, block_count);
+    const bool leave_slip = few_are_brief(coded.tracks);
     std::vector<ChunkToWrite> chunks(size_t(layers) * block_count);
     parallel_for(chunks.size(), goal.jobs, [&](size_t c) {
         ChunkToWrite& chunk = chunks[c];
@@ -63,13 +75,11 @@ void write_window(AssetWriter& writer, uint32_t first_sample, const Window& wind
         std::vector<QuantisedTrack> tracks;
         std::vector<const TrackSamples*> decoded;
         for (size_t i = 0; i < block.size(); ++i)
-            if (layered.layer[i] == chunk.layer && block[i] == chunk.block) {
+            if (layered.layer[i] == chunk.layer && block[i] == chunk.block)
                 tracks.push_back(coded.tracks[i]), decoded.push_back(&coded.decoded[i]);
-                QuantisedTrack& track = tracks.back();
-                const bool throughout = !(track.flags & (format::track_born | format::track_dies));  // of a short window
-                if (track.death - track.birth < most_brief && !throughout) track.flags |= format::track_slips_along;
-            }
         if (tracks.empty()) return;
+        for (QuantisedTrack& track : tracks)
+            if (leave_slip && is_brief(track)) track.flags |= format::track_slips_along;
         const LayerError& error = layered.error[chunk.layer];
         chunk.spacing = error.spacing, chunk.error_mean = error.mean, chunk.error_p99 = error.p99;
         bound(chunk, decoded, 1.5f * error.spacing);
