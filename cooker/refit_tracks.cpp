@@ -76,7 +76,7 @@ private:
     double slide_step() const { return motion_step(steps_, life_) * (track_.flags & format::track_fine ? 1 : slack()); }
     /// How far one step of a coefficient goes at a sample.
     double step_at(int channel, uint32_t k, uint32_t s) const {
-        if (k == 0) return steps_.step;
+        if (k == 0) return mean_step(steps_, life_);
         return basis_.row[s][k] * (channel < height ? slide_step() : channel == height ? motion_step(steps_, life_) : turn_step(steps_, life_));
     }
     void find_units();
@@ -95,7 +95,7 @@ private:
 
 void TrackRefit::find_units() {
     for (auto& of_samples : unit_) of_samples.clear();
-    const FrameAxes axes = axes_of(track_.axis, format::axis_levels(steps_));
+    const FrameAxes axes = axes_of(track_.axis, format::axis_levels(steps_, life_));
     const dvec3 directions[3] = {axes.t1, axes.t2, axes.n};
     for (uint32_t s = 0; s < life_; ++s) {
         dvec3 normal = axes.n;
@@ -110,7 +110,7 @@ void TrackRefit::find_units() {
 /// The axis takes the whole track with it, about the lattice point.
 bool TrackRefit::turn_axis(double worth) {
     constexpr std::array<int32_t, 2> ways[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
-    const int32_t levels = format::axis_levels(steps_);
+    const int32_t levels = format::axis_levels(steps_, life_);
     const FrameAxes now = axes_of(track_.axis, levels);
     std::array<int32_t, 2> chosen{};
     std::vector<dvec3> does(life_), best;

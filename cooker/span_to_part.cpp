@@ -22,14 +22,15 @@ constexpr double finer_by = 0.1;             // an error below its target by mor
 constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
 constexpr double least_gain = 0.4;           // of the error's logarithm per that of the tolerance: crevices narrower than a
                                              // cell stay, and points without end would not tell them
+constexpr double least_hopeless = 1.4;       // times the target: where less is missing, the last attempt may still meet it
 constexpr double most_miss = 0.3;            // edges, of such liquid from the surface: velocities that carry nothing have more
 constexpr double calm_tolerance = 1.1;       // of such liquid: at the same tolerance its error is a tenth below that of other liquid
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
-/// Of the error aimed at: what an attempt begins with. Three splashes take about 1.4 at a quarter of an edge; the finer, the
+/// Of the error aimed at: what an attempt begins with. Three splashes take about 1.48 at a quarter of an edge; the finer, the
 /// more of the error is not the points'.
-double first_tolerance(double edges) { return 1.4 * std::pow(edges / 0.25, 0.2); }
+double first_tolerance(double edges) { return 1.48 * std::pow(edges / 0.25, 0.2); }
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
@@ -145,7 +146,7 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
         kept.attempts = attempt;
         const bool near = miss == 0 || (ratio <= 1 + met_within && ratio >= 1 - finer_by);
         if (near || attempt == most_attempts) return kept;
-        if (attempt > 1 && ratio > 1 && tolerance < tolerance_before &&
+        if (attempt > 1 && ratio > least_hopeless && tolerance < tolerance_before &&
             std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
         ratio_before = ratio, tolerance_before = tolerance;
         tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);

@@ -52,12 +52,15 @@ inline FrameAxes axes_of(const int32_t axis[2], int32_t levels) {
     return {row(0), row(1), row(2)};
 }
 
-/// Steps of the coefficients (k > 0) of a life of so many samples: of motion along the normal, metres, and of normals.
+/// Steps of a life of so many samples: of its mean place along the normal and of its motion (k > 0) there, metres, and of its normals' motion.
+inline double mean_step(const format::LatticeSteps& steps, uint32_t life) {
+    return steps.step * (format::life_scale(life) * format::life_scale_unit);
+}
 inline double motion_step(const format::LatticeSteps& steps, uint32_t life) {
-    return steps.step * std::sqrt(double(life)) * format::position_gain;
+    return mean_step(steps, life) * std::sqrt(double(life)) * format::position_gain;
 }
 inline double turn_step(const format::LatticeSteps& steps, uint32_t life) {
-    return steps.normal_step * std::sqrt(double(life)) * format::normal_gain;
+    return steps.normal_step * (format::life_scale(life) * format::life_scale_unit) * std::sqrt(double(life)) * format::normal_gain;
 }
 
 /// Bits of a coefficient, roughly.

@@ -129,7 +129,7 @@ struct Fitter {
 };
 
 bool Fitter::choose_axis(int32_t (&axis)[2]) const {
-    const int32_t levels = format::axis_levels(steps);
+    const int32_t levels = format::axis_levels(steps, life());
     dvec3 mean(0);
     for (const glm::vec3& n : samples.normal) mean += dvec3(n);
     if (!(glm::length(mean) > 1e-3 * life())) mean = dvec3(samples.normal[0]);
@@ -178,7 +178,7 @@ Attempt Fitter::attempt_point(const Basis& basis) const {
     Attempt out;
     QuantisedTrack& track = out.track;
     const bool planar = choose_axis(track.axis);
-    const FrameAxes axes = axes_of(track.axis, format::axis_levels(steps));
+    const FrameAxes axes = axes_of(track.axis, format::axis_levels(steps, life()));
     Rows<3> normals{}, motion{};
     out.cost = quantise_normals(basis, axes, planar, normals, out.within);
 
@@ -199,13 +199,13 @@ Attempt Fitter::attempt_point(const Basis& basis) const {
     for (int c = 0; c < 2; ++c) {
         Signal signal(n);
         for (uint32_t s = 0; s < n; ++s) signal[s] = glm::dot(position(s) - mean, tangents[c]);
-        if (fine) motion[0][c] = checked(glm::dot(mean - corner, tangents[c]) / steps.step);
+        if (fine) motion[0][c] = checked(glm::dot(mean - corner, tangents[c]) / mean_step(steps, n));
         const double tolerance = quantiser.time_tolerance * slack;
         Coded coded = quantise_series(basis, signal, tolerance, motion_step() * slack, c, motion);
         coded.series[0] = 0;
         out.add(coded);
         for (uint32_t s = 0; s < n; ++s)
-            placed[s] += tangents[c] * (value_at(basis, coded.series, s) + motion[0][c] * double(steps.step));
+            placed[s] += tangents[c] * (value_at(basis, coded.series, s) + motion[0][c] * mean_step(steps, n));
     }
     // Along the axis: to the surface under the placed point; without a surface, to the sample's tangent plane.
     Signal along(n);
@@ -219,7 +219,7 @@ Attempt Fitter::attempt_point(const Basis& basis) const {
     }
     double height = 0;
     for (const double h : along) height += h / n;
-    motion[0][2] = checked(height / steps.step);
+    motion[0][2] = checked(height / mean_step(steps, n));
     out.add(quantise_series(basis, along, quantiser.time_tolerance, motion_step(), 2, motion));
 
     track.flags =
@@ -250,7 +250,7 @@ Attempt Fitter::attempt_drop(const Basis& basis) const {
         double mean = 0;
         for (uint32_t s = 0; s < n; ++s) mean += (signal[s] = position(s)[c]) / n;
         track.lattice[c] = checked(mean / tangent_step());
-        motion[0][c] = checked((mean - track.lattice[c] * tangent_step()) / steps.step);
+        motion[0][c] = checked((mean - track.lattice[c] * tangent_step()) / mean_step(steps, n));
         fit(signal, c, motion);
     }
     for (int c = 0; c < 6; ++c) {

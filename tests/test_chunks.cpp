@@ -22,6 +22,7 @@ using namespace rill::cooker;
 namespace {
 
 constexpr uint32_t window = 25;
+double scale_of(uint32_t life) { return std::pow(8.0 / life, 0.25); }  // of all steps; the format says so in integers
 const Quantiser quantiser{0.002f, 4.f, 0.035f, 0.004f, 0.06f, 0.05f};
 const glm::vec3 origin(0.5f, -0.25f, 1.f);
 
@@ -177,7 +178,7 @@ TEST_CASE("normals in every direction survive, also on the folds of the octahedr
                 const TrackSamples track{0, 0, 0, false, {origin + n}, {n}, {}};
                 tracks.push_back(quantise_track(track, quantiser, origin, tables()));
                 const glm::vec3 back = dequantise_track(tracks.back(), quantiser, origin, tables()).normal[0];
-                CHECK(glm::dot(back, n) > std::cos(1.1f * quantiser.normal_step));
+                CHECK(glm::dot(back, n) > std::cos(1.1 * quantiser.normal_step * scale_of(1)));
             }
     const EncodedChunk chunk = encode(tracks);
     const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
@@ -199,9 +200,10 @@ TEST_CASE("lives of every length keep the promised error") {
             // in the norm add up as a root; 1.7 for the ends, where basis functions are larger.
             const double terms = format::most_terms(life, (q.flags & format::track_cosine) != 0);
             const auto noise = [&](double gain) { return float(0.5 + 1.7 * 0.75 * gain * std::sqrt(terms)); };
-            const float bound = quantiser.time_tolerance + quantiser.step * noise(format::position_gain);
+            const float scale = float(scale_of(life));
+            const float bound = quantiser.time_tolerance + scale * quantiser.step * noise(format::position_gain);
             const float normal_bound =
-                quantiser.normal_tolerance + quantiser.normal_step * noise(format::normal_gain);
+                quantiser.normal_tolerance + scale * quantiser.normal_step * noise(format::normal_gain);
             for (uint32_t s = 0; s < life; ++s) {
                 const glm::vec3 offset = back.position[s] - track.position[s];
                 if (drop) {
@@ -216,6 +218,26 @@ TEST_CASE("lives of every length keep the promised error") {
                 }
             }
         }
+}
+
+TEST_CASE("a place is as exact as the length of its life is worth") {
+    std::mt19937 random(11);
+    for (const uint32_t life : {1u, 2u, 8u, 25u, 33u}) {
+        // What rounding leaves of a place that stands still, along its normal.
+        const double half = 0.5 * quantiser.step * scale_of(life);
+        double worst = 0;
+        for (int repeat = 0; repeat < 200; ++repeat) {
+            TrackSamples track = make_track(random, 0, 0, false);
+            track.death = uint8_t(life - 1);
+            track.position.resize(life, track.position[0]), track.normal.resize(life, track.normal[0]);
+            const QuantisedTrack q = quantise_track(track, quantiser, origin, tables());
+            const glm::vec3 offset = dequantise_track(q, quantiser, origin, tables()).position[0] - track.position[0];
+            worst = std::max(worst, double(std::abs(glm::dot(offset, track.normal[0]))));
+        }
+        INFO("life ", life, " half a step ", half);
+        CHECK(worst < 1.2 * half);
+        CHECK(worst > 0.8 * half);
+    }
 }
 
 TEST_CASE("a normal that turns far, and one that turns over, stay decodable and near") {

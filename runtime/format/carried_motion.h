@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 
+#include "format/lattice.h"
 #include "format/layout.h"
 #include "format/tracks.h"
 
@@ -16,12 +17,6 @@ struct Polynomials {
     int16_t value[most * (most + 1) / 2][carried_terms] = {};
     constexpr const int16_t (*of(uint32_t samples) const)[carried_terms] { return value + samples * (samples - 1) / 2; }
 };
-constexpr int64_t whole_root(int64_t x) {
-    int64_t root = 0;
-    for (int64_t bit = int64_t(1) << 31; bit > 0; bit >>= 1)
-        if ((root + bit) * (root + bit) <= x) root += bit;
-    return root;
-}
 inline constexpr Polynomials polynomials = [] {
     Polynomials out;
     for (int64_t n = 2; n <= Polynomials::most; ++n) {

@@ -44,7 +44,6 @@ public:
           coder_(coder),
           steps_(steps),
           samples_(sample_count),
-          levels_(axis_levels(steps)),
           coarse_scale_((1 << 20) / steps.ratio),
           block_(block) {}
 
@@ -183,7 +182,7 @@ private:
     Coder& coder_;
     const LatticeSteps& steps_;
     uint32_t samples_;
-    int32_t levels_;
+    int32_t levels_ = 0;  ///< of the track at hand
     int32_t coarse_scale_;  ///< 16 / ratio, in 1/65536
     TrackBlock& block_;
     uint32_t first_ = 0, done_ = 0, used_ = 0;

@@ -259,7 +259,7 @@ void ChunkModel<Coder>::along_axis(RawTrack& t, const Frame& frame, const Near& 
     const int64_t reach = steps_.ratio;  // the nearest lattice point is nearer than this
     const bool wild = guess > reach || guess < -reach;
     if (wild) guess = 0;
-    const int32_t likely = int32_t(rounded_division(guess, 16));
+    const int32_t likely = int32_t(rounded_division(guess * 256, life_scale(t.death - t.birth + 1u)));
     const int64_t range = (most - least) / 8;
     const uint32_t spread =
         wild || !weights ? 0 : 1 + at_most(magnitude_class(range < 1000 ? uint32_t(range) : 1000), 6);
@@ -288,6 +288,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
     measure(x);
     const Near near = find_near([](uint32_t) { return true; });
     if (!life(t, near, source)) return false;
+    levels_ = axis_levels(steps_, t.death - t.birth + 1u);
     Frame frame = identity_frame;
     t.axis[0] = t.axis[1] = 0;
     if (drops_) {

@@ -24,10 +24,11 @@ void ChunkModel<Coder>::carry(const RawTrack& t, const Frame& frame, uint32_t te
             for (uint32_t k = 0; k < terms; ++k)
                 for (int a = 0; a < 3; ++a) sum[k][a] += (place[a] >> 12) * to[s][k];
         }
+        const int64_t scale = life_scale(from.death - from.birth + 1u) * 4096 / life_scale(life);  // of its steps to mine
         for (uint32_t k = 0; k < terms; ++k) {
             int64_t v[3];
             for (int a = 0; a < 3; ++a) {
-                v[a] = (sum[k][a] >> 12) / life * polynomial_sign(k + 1, t.flags);
+                v[a] = (((sum[k][a] >> 12) / life) * scale >> 12) * polynomial_sign(k + 1, t.flags);
                 v[a] = v[a] < -max_mean ? -max_mean : v[a] > max_mean ? max_mean : v[a];
             }
             for (int b = 0; b < 3; ++b) {

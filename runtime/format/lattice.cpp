@@ -42,9 +42,9 @@ bool valid(const LatticeSteps& steps) noexcept {
     return good;
 }
 
-int32_t axis_levels(const LatticeSteps& steps) noexcept {
-    const float levels = 1.8f / steps.normal_step;
-    return levels < 4.f ? 4 : levels > 4096.f ? 4096 : int32_t(levels + 0.5f);
+int32_t axis_levels(const LatticeSteps& steps, uint32_t life) noexcept {
+    const double levels = 1.8 / (steps.normal_step * (life_scale(life) * life_scale_unit));
+    return levels < 4 ? 4 : levels > 4096 ? 4096 : int32_t(levels + 0.5);
 }
 
 Frame frame_of(const int32_t axis[2], int32_t levels) noexcept {
@@ -117,7 +117,8 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
     track.flags = uint8_t(raw.flags & (track_born | track_dies | track_cosine));
     track.position_terms = raw.position_terms, track.second_terms = raw.second_terms;
 
-    const Frame frame = drop ? identity_frame : frame_of(raw.axis, axis_levels(steps));
+    const uint32_t life = raw.death - raw.birth + 1u;
+    const Frame frame = drop ? identity_frame : frame_of(raw.axis, axis_levels(steps, life));
     const int64_t ratio = drop || (raw.flags & track_fine) ? 16 : steps.ratio;
     float* out = block.coefficients + first_coefficient;
     for (int c = 0; c < 3; ++c) {
@@ -125,7 +126,7 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
             (int64_t(raw.position[0][0]) * frame.row[0][c] + int64_t(raw.position[0][1]) * frame.row[1][c]) *
                 ratio +
             int64_t(raw.position[0][2]) * frame.row[2][c] * 16;
-        const int64_t mean = int64_t(raw.lattice[c]) * steps.ratio + rounded(offset, 16384);
+        const int64_t mean = int64_t(raw.lattice[c]) * steps.ratio + rounded(offset * life_scale(life), int64_t(16384) << 12);
         if (magnitude(mean) > max_mean) return false;
         store(out + c, int32_t(mean));
     }
@@ -152,15 +153,17 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
 void finish_block(const LatticeSteps& steps, TrackBlock& block) noexcept {
     for (int c = 0; c < 3; ++c) block.origin[c] = steps.origin[c];
     block.slip_unit = steps.slip_step / 2;
-    const int32_t levels = axis_levels(steps);
     const uint32_t count = block.point_count + block.drop_count;
     for (uint32_t i = 0; i < count; ++i) {
         const Track& track = block.tracks[i];
         const bool drop = i >= block.point_count;
-        const double root = std::sqrt(double(track.death - track.birth + 1));
-        const double position_step = steps.step * root * position_gain / 256;
+        const uint32_t life = track.death - track.birth + 1u;
+        const double root = std::sqrt(double(life));
+        const int32_t levels = axis_levels(steps, life);
+        const double scaled_root = root * (life_scale(life) * life_scale_unit);
+        const double position_step = steps.step * scaled_root * position_gain / 256;
         const double second_step =
-            (drop ? double(steps.step) * position_gain : steps.normal_step * normal_gain) * root / 256;
+            (drop ? double(steps.step) * position_gain : steps.normal_step * normal_gain) * scaled_root / 256;
         float* at = block.coefficients + track.first_coefficient;
         for (int c = 0; c < 3; ++c, ++at) *at = float(load(at) * (steps.step * root / 16));
         for (uint32_t k = 3; k < track.position_terms * 3u; ++k, ++at) *at = float(load(at) * position_step);

@@ -16,7 +16,8 @@ inline constexpr uint8_t magic[8] = {'R', 'I', 'L', 'L', '\r', '\n', 0x1a, '\n'}
 enum Version : uint32_t {
     version_1 = 1,  ///< 2026-11: first
     version_2 = 2,  ///< 2026-11: slip: points follow the surface, and say how the liquid slides under them
-    current_version = version_2,
+    version_3 = 3,  ///< 2026-11: steps depend on the life of a track
+    current_version = version_3,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.

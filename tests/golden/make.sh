@@ -8,7 +8,7 @@ set -eu
 rill=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
 cd "$(dirname "$0")"
 input=../../content/drop_splash
-"$rill" cook $input -o v2.rill --frames 17:25 --window 4 --layers 3 --error 0.5e --jobs 1 --force --quiet || [ $? -eq 3 ]
-"$rill" info v2.rill --json >v2.info.json
-"$rill" verify v2.rill $input --frames 21 --json v2.verify.json >/dev/null 2>&1 || [ $? -eq 3 ]  # 3: an error target missed
-ls -l v2.*
+"$rill" cook $input -o v3.rill --frames 17:25 --window 4 --layers 3 --error 0.5e --jobs 1 --force --quiet || [ $? -eq 3 ]
+"$rill" info v3.rill --json >v3.info.json
+"$rill" verify v3.rill $input --frames 21 --json v3.verify.json >/dev/null 2>&1 || [ $? -eq 3 ]  # 3: an error target missed
+ls -l v3.*
