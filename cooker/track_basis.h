@@ -54,13 +54,13 @@ inline FrameAxes axes_of(const int32_t axis[2], int32_t levels) {
 
 /// Steps of a life of so many samples: of its mean place along the normal and of its motion (k > 0) there, metres, and of its normals' motion.
 inline double mean_step(const format::LatticeSteps& steps, uint32_t life) {
-    return steps.step * (format::life_scale(life) * format::life_scale_unit);
+    return steps.step * format::life_factor(life);
 }
 inline double motion_step(const format::LatticeSteps& steps, uint32_t life) {
     return mean_step(steps, life) * std::sqrt(double(life)) * format::position_gain;
 }
 inline double turn_step(const format::LatticeSteps& steps, uint32_t life) {
-    return steps.normal_step * (format::life_scale(life) * format::life_scale_unit) * std::sqrt(double(life)) * format::normal_gain;
+    return steps.normal_step * format::life_factor(life) * std::sqrt(double(life)) * format::normal_gain;
 }
 
 /// Bits of a coefficient, roughly.

@@ -43,7 +43,7 @@ bool valid(const LatticeSteps& steps) noexcept {
 }
 
 int32_t axis_levels(const LatticeSteps& steps, uint32_t life) noexcept {
-    const double levels = 1.8 / (steps.normal_step * (life_scale(life) * life_scale_unit));
+    const double levels = 1.8 / (steps.normal_step * life_factor(life));
     return levels < 4 ? 4 : levels > 4096 ? 4096 : int32_t(levels + 0.5);
 }
 
@@ -160,7 +160,7 @@ void finish_block(const LatticeSteps& steps, TrackBlock& block) noexcept {
         const uint32_t life = track.death - track.birth + 1u;
         const double root = std::sqrt(double(life));
         const int32_t levels = axis_levels(steps, life);
-        const double scaled_root = root * (life_scale(life) * life_scale_unit);
+        const double scaled_root = root * life_factor(life);
         const double position_step = steps.step * scaled_root * position_gain / 256;
         const double second_step =
             (drop ? double(steps.step) * position_gain : steps.normal_step * normal_gain) * scaled_root / 256;

@@ -40,7 +40,8 @@ inline constexpr std::array<int32_t, max_window_samples + 1> life_scales = [] {
     return scales;
 }();
 constexpr int32_t life_scale(uint32_t samples) { return life_scales[samples < max_window_samples ? samples : max_window_samples]; }
-inline constexpr double life_scale_unit = 1.0 / 4096;
+/// The same as a factor.
+constexpr double life_factor(uint32_t samples) { return life_scale(samples) / 4096.0; }
 
 /// Coefficients of the orthonormal basis grow with √samples; these fractions of step · √samples (and
 /// normal_step · √samples), scaled by the life, are their quantiser steps. Means (k = 0) use the whole step, scaled likewise.
