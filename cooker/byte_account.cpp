@@ -29,22 +29,19 @@ private:
     int category_ = 0;
 };
 
-Bits bits_of(const AssetDirectory& directory, uint32_t index, uint32_t samples) {
+Bits bits_of(const AssetDirectory& directory, uint32_t index, const format::WindowRecord& window) {
     const format::ChunkRecord& record = directory.chunks[index];
     const std::vector<uint8_t> bytes = read_chunk(directory, index);
     std::vector<format::Track> tracks(record.point_count + record.drop_count);
     std::vector<float> coefficients(record.coefficient_count);
     format::TrackBlock block{{}, 0, record.point_count, record.drop_count, record.coefficient_count, tracks.data(), coefficients.data()};
-    const char* why = "it is shorter than its head";
-    if (bytes.size() >= format::lattice_steps_bytes) {
-        const format::LatticeSteps steps = format::read_steps(bytes.data());
-        CountingDecoder coder(bytes.data() + format::lattice_steps_bytes, bytes.data() + bytes.size());
-        const format::ChunkShape shape{samples, record.point_count, record.drop_count, record.coefficient_count};
-        const auto learned = std::make_unique<format::Statistics>(format::first_statistics);
-        why = valid(steps) ? format::walk_chunk(coder, steps, shape, block, *learned) : "its steps are not sensible";
-        if (!why) return coder.spent;
-    }
-    throw InputError(directory.path + ": damaged: chunk " + std::to_string(index) + ": " + why);
+    CountingDecoder coder(bytes.data(), bytes.data() + bytes.size());
+    const format::ChunkShape shape{window.sample_count, record.point_count, record.drop_count, record.coefficient_count,
+                                   steps_of(directory.header, window)};
+    const auto learned = std::make_unique<format::Statistics>(format::first_statistics);
+    if (const char* why = format::walk_chunk(coder, shape, block, *learned))
+        throw InputError(directory.path + ": damaged: chunk " + std::to_string(index) + ": " + why);
+    return coder.spent;
 }
 
 /// Whole bytes that add up: each kind ends at the byte nearest to where its bits end.
@@ -67,7 +64,7 @@ void share_out(const Bits& bits, uint64_t coded, LayerBytes& layer) {
 }  // namespace
 
 uint64_t LayerBytes::sum() const {
-    return directory + heads + structure + births + first_coefficients + motion + normals + slip + drops + padding;
+    return directory + structure + births + first_coefficients + motion + normals + slip + drops + padding;
 }
 uint64_t ByteAccount::sum() const {
     uint64_t all = header + frame_times + windows + model + settings + unused;
@@ -77,11 +74,11 @@ uint64_t ByteAccount::sum() const {
 
 ByteAccount account_for_bytes(const AssetDirectory& directory) {
     const format::Header& h = directory.header;
-    std::vector<uint32_t> samples(directory.chunks.size());
+    std::vector<const format::WindowRecord*> windows(directory.chunks.size());
     for (const format::WindowRecord& window : directory.windows)
-        std::fill_n(samples.begin() + window.first_chunk, window.chunk_count, window.sample_count);
-    std::vector<Bits> chunk_bits(samples.size());
-    parallel_for(samples.size(), 0, [&](size_t c) { chunk_bits[c] = bits_of(directory, uint32_t(c), samples[c]); });
+        std::fill_n(windows.begin() + window.first_chunk, window.chunk_count, &window);
+    std::vector<Bits> chunk_bits(windows.size());
+    parallel_for(windows.size(), 0, [&](size_t c) { chunk_bits[c] = bits_of(directory, uint32_t(c), *windows[c]); });
 
     ByteAccount account;
     account.header = format::header_bytes, account.frame_times = uint64_t(h.frame_time_count) * sizeof(double);
@@ -91,12 +88,12 @@ ByteAccount account_for_bytes(const AssetDirectory& directory) {
     std::vector<Bits> bits(h.layer_count, Bits{});
     std::vector<uint64_t> coded(h.layer_count, 0);
     uint64_t end = format::header_bytes + h.directory_bytes;
-    for (size_t c = 0; c < samples.size(); ++c) {
+    for (size_t c = 0; c < windows.size(); ++c) {
         const format::ChunkRecord& record = directory.chunks[c];
         account.unused += record.offset - end, end = record.offset + record.bytes;
         LayerBytes& layer = account.layers[record.layer];
-        layer.directory += format::chunk_record_bytes, layer.heads += format::lattice_steps_bytes;
-        coded[record.layer] += record.bytes - format::lattice_steps_bytes;
+        layer.directory += format::chunk_record_bytes;
+        coded[record.layer] += record.bytes;
         for (size_t kind = 0; kind < chunk_bits[c].size(); ++kind) bits[record.layer][kind] += chunk_bits[c][kind];
     }
     account.unused += h.file_bytes - end;
@@ -107,7 +104,7 @@ ByteAccount account_for_bytes(const AssetDirectory& directory) {
 nlohmann::json to_json(const ByteAccount& account) {
     nlohmann::json layers = nlohmann::json::array();
     for (const LayerBytes& l : account.layers)
-        layers.push_back({{"directory", l.directory}, {"heads", l.heads}, {"structure", l.structure}, {"births", l.births},
+        layers.push_back({{"directory", l.directory}, {"structure", l.structure}, {"births", l.births},
                           {"first_coefficients", l.first_coefficients}, {"motion", l.motion}, {"normals", l.normals},
                           {"slip", l.slip}, {"drops", l.drops}, {"padding", l.padding}});
     return {{"header", account.header}, {"frame_times", account.frame_times}, {"windows", account.windows}, {"model", account.model},

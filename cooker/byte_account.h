@@ -11,7 +11,6 @@ namespace rill::cooker {
 /// What the bytes of a layer are for. The coder spends fractions of bits: kinds are rounded so that they add up.
 struct LayerBytes {
     uint64_t directory = 0;           ///< records of its chunks
-    uint64_t heads = 0;               ///< of chunks: quantiser steps, origin
     uint64_t structure = 0;           ///< boxes; birth, death and kind of tracks
     uint64_t births = 0;              ///< where on the lattice tracks stand
     uint64_t first_coefficients = 0;  ///< mean normal, and the mean position's rest along it
@@ -23,7 +22,7 @@ struct LayerBytes {
 };
 struct ByteAccount {
     uint64_t header = 0, frame_times = 0, windows = 0, model = 0, settings = 0;
-    uint64_t unused = 0;              ///< between chunks: the format allows it, the cooker leaves none
+    uint64_t unused = 0;              ///< between windows: the format allows it, the cooker leaves none
     std::vector<LayerBytes> layers;
     uint64_t sum() const;             ///< the size of the file, exactly
 };

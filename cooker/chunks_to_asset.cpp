@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <tuple>
 #include <utility>
 
 #include "format/check.h"
+#include "format/lattice.h"
 #include "format/crc32.h"
 #include "mesh.h"
 
@@ -75,11 +77,13 @@ struct ByteWriter {
     std::vector<uint8_t> bytes;
 
     template <class T>
-    void integer(T value) {
-        for (size_t i = 0; i < sizeof(T); ++i) bytes.push_back(uint8_t(uint64_t(value) >> (8 * i)));
+    void integer(T value, size_t size = sizeof(T)) {
+        for (size_t i = 0; i < size; ++i) bytes.push_back(uint8_t(uint64_t(value) >> (8 * i)));
     }
     void real(float value) { integer(bits<uint32_t>(value)); }
     void real(double value) { integer(bits<uint64_t>(value)); }
+    /// The nearest that is half as long.
+    void half(float value) { integer(uint16_t((uint64_t(bits<uint32_t>(value)) + 0x8000) >> 16)); }
     void vector(const float* v) {
         for (int a = 0; a < 3; ++a) real(v[a]);
     }
@@ -125,26 +129,40 @@ void write_header(ByteWriter& out, const format::Header& h) {
 }
 
 void write_window(ByteWriter& out, const format::WindowRecord& w) {
-    for (const uint32_t field :
-         {w.first_sample, w.sample_count, w.first_chunk, w.chunk_count, w.block_count, w.reserved})
-        out.integer(field);
+    out.integer(w.offset);
+    for (const uint32_t field : {w.first_sample, w.sample_count, w.first_chunk, w.chunk_count}) out.integer(field);
+    out.integer(w.block_count);
+    out.integer(w.ratio);
+    for (const float field : {w.step, w.normal_step, w.slip_step}) out.real(field);
 }
 
-void write_chunk(ByteWriter& out, const format::ChunkRecord& c) {
-    out.integer(c.offset);
+/// The nearest bound of the format that is no less than x, or no more.
+int16_t bound_units(const std::string& path, const format::Header& h, int axis, float x, bool upper) {
+    const double units = (double(x) - h.lower[axis]) / format::bounds_unit(h);
+    double whole = std::round(units);  // bounds that were read from a file stay what they are
+    if (!(std::abs(whole) < INT16_MAX)) throw InputError(path + ": cannot be stored as an asset: a chunk reaches far out of the bounds");
+    const auto misses = [&] {
+        const float bound = format::bound_at(h, axis, int16_t(whole));
+        return upper ? bound < x : bound > x;
+    };
+    if (misses()) whole += upper ? 1 : -1;
+    return int16_t(whole);
+}
+
+/// `h`: its bounds and cell size. `path`: named in errors.
+void write_chunk(ByteWriter& out, const format::ChunkRecord& c, const format::Header& h, const std::string& path) {
     out.integer(c.bytes);
     out.integer(c.crc);
-    out.integer(c.layer);
-    out.integer(c.block);
-    out.integer(c.point_count);
-    out.integer(c.drop_count);
+    out.integer(uint8_t(c.layer));
+    out.integer(uint8_t(c.block));
+    out.integer(c.point_count, 3);
+    out.integer(c.drop_count, 3);
     out.integer(c.coefficient_count);
-    out.vector(c.lower);
-    out.vector(c.upper);
-    out.real(c.spacing);
-    out.real(c.error_mean);
-    out.real(c.error_p99);
-    out.integer(c.reserved);
+    for (int a = 0; a < 3; ++a) out.integer(bound_units(path, h, a, c.lower[a], false));
+    for (int a = 0; a < 3; ++a) out.integer(bound_units(path, h, a, c.upper[a], true));
+    out.half(c.spacing);
+    out.half(c.error_mean);
+    out.half(c.error_p99);
 }
 
 format::ChunkRecord record_of(const ChunkToWrite& chunk) {
@@ -172,23 +190,38 @@ struct AssetWriter::Impl {
     std::string path;
     NewFile spool;
     uint64_t spooled = 0;
-    std::vector<format::WindowRecord> windows;
-    std::vector<format::ChunkRecord> chunks;  ///< offsets within the spool until finish()
+    std::vector<format::WindowRecord> windows;  ///< offsets within the spool until finish()
+    std::vector<format::ChunkRecord> chunks;
+    glm::vec3 origin{NAN};                      ///< of all positions so far; NaN: there are none
 
     explicit Impl(std::string target) : path(std::move(target)), spool(path + ".spool") {}
 
+    void told_from(const glm::vec3& place);
     std::vector<uint8_t> directory(const AssetFacts& facts, uint64_t chunks_at) const;
     format::Header header(const AssetFacts& facts, const std::vector<uint8_t>& directory) const;
 };
 
+/// The file has one origin, the low corner of its bounds.
+void AssetWriter::Impl::told_from(const glm::vec3& place) {
+    if (std::isnan(origin.x)) origin = place;
+    if (origin != place) throw InputError(path + ": cannot be stored as an asset: its positions are told from different places");
+}
+
+void set_bounds(format::Header& h, const AssetFacts& facts) {
+    h.cell_size = facts.cell_size;
+    for (int a = 0; a < 3; ++a) h.lower[a] = facts.lower[a], h.upper[a] = facts.upper[a];
+}
+
 std::vector<uint8_t> AssetWriter::Impl::directory(const AssetFacts& facts, uint64_t chunks_at) const {
+    format::Header bounds{};
+    set_bounds(bounds, facts);
     ByteWriter out;
     for (const double seconds : facts.frame_seconds) out.real(seconds);
-    for (const format::WindowRecord& window : windows) write_window(out, window);
-    for (format::ChunkRecord chunk : chunks) {
-        chunk.offset += chunks_at;
-        write_chunk(out, chunk);
+    for (format::WindowRecord window : windows) {
+        window.offset += chunks_at;
+        write_window(out, window);
     }
+    for (const format::ChunkRecord& chunk : chunks) write_chunk(out, chunk, bounds, path);
     out.raw(facts.model.data(), facts.model.size());
     out.raw(facts.settings_json.data(), facts.settings_json.size());
     return std::move(out.bytes);
@@ -213,13 +246,9 @@ format::Header AssetWriter::Impl::header(const AssetFacts& facts, const std::vec
     h.frame_time_count = uint32_t(facts.frame_seconds.size());
     h.model_bytes = uint32_t(facts.model.size());
     h.settings_bytes = uint32_t(facts.settings_json.size());
-    h.cell_size = facts.cell_size;
     h.frames_per_second = facts.frames_per_second;
     h.first_seconds = facts.first_seconds;
-    for (int a = 0; a < 3; ++a) {
-        h.lower[a] = facts.lower[a];
-        h.upper[a] = facts.upper[a];
-    }
+    set_bounds(h, facts);
     return h;
 }
 
@@ -241,6 +270,10 @@ void check_own(const std::string& path, const std::vector<uint8_t>& head, const 
     if (status != Status::ok) throw InputError(path + ": cannot be stored as an asset: " + reason);
 }
 
+bool alike(const format::LatticeSteps& a, const format::LatticeSteps& b) {
+    return std::tie(a.step, a.normal_step, a.ratio, a.slip_step) == std::tie(b.step, b.normal_step, b.ratio, b.slip_step);
+}
+
 }  // namespace
 
 AssetWriter::AssetWriter(std::string path) : impl_(std::make_unique<Impl>(std::move(path))) {}
@@ -251,14 +284,17 @@ void AssetWriter::add_window(uint32_t first_sample, uint32_t sample_count, uint3
     std::sort(chunks.begin(), chunks.end(), [](const ChunkToWrite& a, const ChunkToWrite& b) {
         return std::tie(a.layer, a.block) < std::tie(b.layer, b.block);
     });
-    impl_->windows.push_back({first_sample, sample_count, uint32_t(impl_->chunks.size()),
-                              uint32_t(chunks.size()), block_count, 0});
+    const format::LatticeSteps steps = chunks.empty() ? format::LatticeSteps{} : chunks.front().encoded.shape.steps;
+    impl_->windows.push_back({impl_->spooled, first_sample, sample_count, uint32_t(impl_->chunks.size()), uint32_t(chunks.size()),
+                              uint16_t(block_count), steps.ratio, steps.step, steps.normal_step, steps.slip_step});
     for (const ChunkToWrite& chunk : chunks) {
-        if (chunk.layer >= format::max_layers || chunk.block >= format::max_blocks ||
+        if (chunk.layer >= format::max_layers || chunk.block >= format::max_blocks || block_count > format::max_blocks ||
             chunk.encoded.bytes.size() > UINT32_MAX)
             throw InputError(impl_->path + ": cannot be stored as an asset: a chunk is beyond the format's limits");
+        if (!alike(chunk.encoded.shape.steps, steps))
+            throw InputError(impl_->path + ": cannot be stored as an asset: the chunks of a window have different steps");
+        impl_->told_from({steps.origin[0], steps.origin[1], steps.origin[2]});
         impl_->chunks.push_back(record_of(chunk));
-        impl_->chunks.back().offset = impl_->spooled;
         impl_->spool.write(chunk.encoded.bytes.data(), chunk.encoded.bytes.size());
         impl_->spooled += chunk.encoded.bytes.size();
     }
@@ -267,20 +303,22 @@ void AssetWriter::add_window(uint32_t first_sample, uint32_t sample_count, uint3
 void AssetWriter::append(const AssetDirectory& part, uint32_t first_sample) {
     const uint32_t first_chunk = uint32_t(impl_->chunks.size());
     for (format::WindowRecord window : part.windows) {
-        window.first_sample += first_sample, window.first_chunk += first_chunk;
+        const uint32_t first = window.first_chunk;
+        window.offset = impl_->spooled, window.first_sample += first_sample, window.first_chunk += first_chunk;
         impl_->windows.push_back(window);
+        for (uint32_t c = first; c < first + window.chunk_count; ++c) {
+            const std::vector<uint8_t> bytes = read_chunk(part, c);
+            impl_->chunks.push_back(part.chunks[c]);
+            impl_->spool.write(bytes.data(), bytes.size());
+            impl_->spooled += bytes.size();
+        }
     }
-    for (uint32_t c = 0; c < part.chunks.size(); ++c) {
-        const std::vector<uint8_t> bytes = read_chunk(part, c);
-        impl_->chunks.push_back(part.chunks[c]);
-        impl_->chunks.back().offset = impl_->spooled;
-        impl_->spool.write(bytes.data(), bytes.size());
-        impl_->spooled += bytes.size();
-    }
+    if (!part.chunks.empty()) impl_->told_from({part.header.lower[0], part.header.lower[1], part.header.lower[2]});
 }
 
 void AssetWriter::finish(const AssetFacts& facts) {
     Impl& impl = *impl_;
+    if (!impl.chunks.empty()) impl.told_from(facts.lower);
     const size_t directory_bytes = impl.directory(facts, 0).size();
     const std::vector<uint8_t> directory = impl.directory(facts, format::header_bytes + directory_bytes);
     if (directory.size() > format::max_directory_bytes)

@@ -17,7 +17,6 @@
 #include "layers_to_chunks.h"
 
 #include <algorithm>
-#include <cstring>
 #include <memory>
 
 #include "entropy_encoder.h"
@@ -30,15 +29,6 @@ namespace {
 
 using format::RawTrack;
 using Model = format::ChunkModel<RangeEncoder>;
-
-void append(std::vector<uint8_t>& bytes, uint32_t value, int count) {
-    for (int b = 0; b < count; ++b) bytes.push_back(uint8_t(value >> (8 * b)));
-}
-void append(std::vector<uint8_t>& bytes, float value) {
-    uint32_t bits;
-    std::memcpy(&bits, &value, sizeof bits);
-    append(bytes, bits, 4);
-}
 
 struct Set {
     std::vector<RawTrack> tracks;  ///< in the order of the k-d tree
@@ -113,7 +103,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
     const Set sets[2] = {make_set(tracks, false, steps), make_set(tracks, true, steps)};
 
     EncodedChunk out;
-    out.shape.sample_count = window_samples;
+    out.shape.sample_count = window_samples, out.shape.steps = steps;
     out.shape.point_count = uint32_t(sets[0].tracks.size());
     out.shape.drop_count = uint32_t(sets[1].tracks.size());
     for (int s = 0; s < 2; ++s)
@@ -121,12 +111,6 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
             if (t.death >= window_samples) throw InputError("chunk: a track outlives its window");
             out.shape.coefficient_count += format::coefficients_of(t, s == 1);
         }
-    append(out.bytes, steps.step);
-    append(out.bytes, steps.normal_step);
-    for (const float x : steps.origin) append(out.bytes, x);
-    append(out.bytes, steps.ratio, 2);
-    append(out.bytes, steps.slip_step);
-
     std::vector<format::Track> records(tracks.size());
     std::vector<float> coefficients(out.shape.coefficient_count);
     format::TrackBlock block{};
@@ -142,7 +126,7 @@ EncodedChunk encode_chunk(const std::vector<QuantisedTrack>& tracks, const Quant
         const Set& set = sets[s];
         if (set.tracks.empty()) continue;
         for (int c = 0; c < 3; ++c) {
-            model->raw(32, uint32_t(set.low[c]));
+            model->number(set.low[c]);
             model->raw(5, set.bits[c]);
         }
         const auto source = [&](uint32_t i) { return &set.tracks[i]; };

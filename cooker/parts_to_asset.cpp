@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 
 #include "pipeline.h"
@@ -75,8 +77,20 @@ void add(SpanResult& sum, const SpanResult& more) {
     sum.seconds.insert(sum.seconds.end(), more.seconds.begin() + long(shared), more.seconds.end());
 }
 
+constexpr size_t longest_number = 12;  // as text
+
+/// Every byte of an asset counts: six digits are all that anybody reads.
+void shorten_numbers(json& value) {
+    if (value.is_structured())
+        for (json& part : value) shorten_numbers(part);
+    if (!value.is_number_float()) return;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value.get<double>());
+    value = std::strtod(text, nullptr);
+}
+
 json asset_settings(const CookFacts& facts, const std::vector<SpanResult>& spans, const SpanResult& all) {
-    const auto bytes = [](double bits) { return std::round(bits / 8); };
+    const auto bytes = [](double bits) { return uint64_t(std::llround(bits / 8)); };
     const double diagonal = glm::distance(facts.lower, facts.upper);
     json settings = facts.cook, list = json::array();
     for (const SpanResult& s : spans)
@@ -84,10 +98,14 @@ json asset_settings(const CookFacts& facts, const std::vector<SpanResult>& spans
     settings["spans"] = list;
     settings["bytes"] = {{"structure", bytes(all.bits.structure)}, {"births", bytes(all.bits.births)}, {"motion", bytes(all.bits.motion)},
                          {"normals", bytes(all.bits.normals)}, {"slip", bytes(all.bits.slip)}, {"drops", bytes(all.bits.drops)}};
-    settings["layer_bytes"] = all.layer_bytes, settings["tracks"] = all.tracks;
+    settings["layer_bytes"] = json::array();
+    for (const double layer : all.layer_bytes) settings["layer_bytes"].push_back(uint64_t(layer));
+    settings["tracks"] = all.tracks;
     settings["points_per_frame"] = double(all.point_frames) / double(all.numbers.size());
     settings["lives"] = lives_json(all);
     settings["measured"] = summary_json(all.measured, diagonal);
+    for (const char* key : {"spans", "points_per_frame", "measured", "source", "target"})
+        if (settings.contains(key)) shorten_numbers(settings[key]);
     add_numbers(settings, all.numbers);
     return settings;
 }
@@ -190,9 +208,8 @@ double bytes_in_asset(const CookFacts& facts, const AssetDirectory& part, const 
     const json settings = asset_settings(facts, {span}, span);
     double common = double(settings.dump().size());
     // What is measured only when the span is done will have all its digits.
-    constexpr double digits = 20;
     for (const json& value : settings.at("measured"))
-        if (span.measured.area == 0 && !value.is_number_integer()) common += digits - double(value.dump().size());
+        if (span.measured.area == 0 && !value.is_number_integer()) common += double(longest_number) - double(value.dump().size());
     const double own = double(settings.at("spans").at(0).dump().size()), spans = facts.cook.at("span_count");
     const double tables = double(part.header.directory_bytes - part.header.settings_bytes);
     double chunks = 0;

@@ -136,12 +136,15 @@ Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<v
 }  // namespace
 
 json read_settings(const ReadOptions& options) {
-    json range = nullptr;
-    if (options.step != 0) range = {options.first, options.last, options.step};
-    return {{"fps", options.frames_per_second}, {"frames", range}, {"velocity", options.velocity_name},
-            {"velocity_unit", options.velocity_per_frame ? "frame" : "second"},
-            {"up", options.up == 'y' ? "y" : "z"}, {"handedness", options.handedness == 'l' ? "left" : "right"},
-            {"scale", options.scale > 0 ? options.scale : 1}};
+    json asked = json::object();
+    if (options.frames_per_second > 0) asked["fps"] = options.frames_per_second;
+    if (options.step != 0) asked["frames"] = {options.first, options.last, options.step};
+    if (!options.velocity_name.empty()) asked["velocity"] = options.velocity_name;
+    if (options.velocity_per_frame) asked["velocity_unit"] = "frame";
+    if (options.up == 'y') asked["up"] = "y";
+    if (options.handedness == 'l') asked["handedness"] = "left";
+    if (options.scale > 0 && options.scale != 1) asked["scale"] = options.scale;
+    return asked;
 }
 
 std::string known_input(const SequenceReader& reader, const ReadOptions& options, const std::string& file, int jobs) {

@@ -65,8 +65,8 @@ inline void check_bytes(const std::string& asset) {
         const uint64_t chunks = layer["chunks"];
         uint64_t sum = 0;
         for (const auto& [kind, value] : kinds.items()) sum += value.get<uint64_t>();
-        CHECK(sum == layer["bytes"].get<uint64_t>() + 72 * chunks);
-        CHECK(kinds["heads"] == 26 * chunks);
+        CHECK(sum == layer["bytes"].get<uint64_t>() + 38 * chunks);
+        CHECK(kinds["directory"] == 38 * chunks);
         CHECK(kinds["padding"] <= chunks);  // less than a byte each
         all += sum;
     }

@@ -85,17 +85,20 @@ void put_right(Bytes& bytes) {
     if (bytes.size() < format::header_bytes) return;
     put(bytes, offsetof(format::Header, file_bytes), uint64_t(bytes.size()));
     const format::Header header = header_of(bytes);
-    const uint64_t first = format::header_bytes + uint64_t(header.frame_time_count) * sizeof(double) +
-                           uint64_t(header.window_count) * format::window_record_bytes;
-    uint64_t content = format::fnv1a_start;
-    for (uint32_t i = 0; i < header.chunk_count; ++i) {
-        const uint64_t at = first + uint64_t(i) * format::chunk_record_bytes;
-        if (at + format::chunk_record_bytes > bytes.size()) break;
-        const auto chunk = get<format::ChunkRecord>(bytes, at);
-        uint32_t crc = chunk.crc;
-        if (chunk.offset <= bytes.size() && chunk.bytes <= bytes.size() - chunk.offset)
-            put(bytes, at + offsetof(format::ChunkRecord, crc), crc = format::crc32(bytes.data() + chunk.offset, chunk.bytes));
-        content = format::fnv1a(content, crc);
+    const uint64_t windows = format::header_bytes + uint64_t(header.frame_time_count) * sizeof(double);
+    uint64_t content = format::fnv1a_start, at = windows + uint64_t(header.window_count) * format::window_record_bytes;
+    for (uint32_t w = 0; w < header.window_count; ++w) {
+        const uint64_t place = windows + uint64_t(w) * format::window_record_bytes;
+        if (place + format::window_record_bytes > bytes.size()) break;
+        const auto window = get<format::WindowRecord>(bytes, place);
+        uint64_t offset = window.offset;
+        for (uint32_t i = 0; i < window.chunk_count && at + format::chunk_record_bytes <= bytes.size(); ++i, at += format::chunk_record_bytes) {
+            const auto size = get<uint32_t>(bytes, at + field_bytes);
+            uint32_t crc = get<uint32_t>(bytes, at + field_crc);
+            if (offset <= bytes.size() && size <= bytes.size() - offset)
+                put(bytes, at + field_crc, crc = format::crc32(bytes.data() + offset, size));
+            content = format::fnv1a(content, crc), offset += size;
+        }
     }
     put(bytes, offsetof(format::Header, content_hash), content);
     seal(bytes);

@@ -213,11 +213,13 @@ inline void bound_chunk(const Clip& clip, uint32_t block, uint32_t first, uint32
     chunk.upper = high + corner + size - 0.99f;
 }
 
+inline constexpr glm::vec3 ball_lower = {-1.5f, -1.1f, -1.1f};
+
 /// Blocks as Clip says, `layers` layers of which each doubles the points.
 inline std::vector<rill::cooker::ChunkToWrite> ball_chunks(const Clip& clip, uint32_t first, uint32_t samples) {
     using namespace rill;
     const cooker::Quantiser quantiser{1e-4f, 2, 1e-3f, 2e-4f, 2e-3f};
-    const glm::vec3 origin(-4);
+    const glm::vec3 origin = ball_lower;
     std::vector<double> memory(format::basis_tables_bytes(samples) / sizeof(double) + 2);
     format::BasisTables tables{};
     format::build_basis_tables(tables, memory.data(), samples);
@@ -272,7 +274,7 @@ inline rill::cooker::AssetFacts ball_facts(const Clip& clip) {
     facts.frames_per_second = Clip::fps;
     for (uint32_t f = 0; clip.uneven && f < clip.frames; ++f) facts.frame_seconds.push_back(clip.seconds(f));
     facts.cell_size = clip.cell;
-    facts.lower = {-1.5f, -1.1f, -1.1f};
+    facts.lower = ball_lower;
     facts.upper = {1.5f, clip.drop ? 3.3f : 1.1f, 1.1f};
     facts.settings_json = clip.settings;
     return facts;
@@ -315,11 +317,23 @@ inline size_t windows_at(const Bytes& bytes) {
 inline size_t chunks_at(const Bytes& bytes) {
     return windows_at(bytes) + header_of(bytes).window_count * rill::format::window_record_bytes;
 }
-inline rill::format::ChunkRecord chunk_of(const Bytes& bytes, uint32_t index) {
-    return get<rill::format::ChunkRecord>(bytes, chunks_at(bytes) + index * rill::format::chunk_record_bytes);
-}
+inline size_t chunk_at(const Bytes& bytes, uint32_t index) { return chunks_at(bytes) + index * rill::format::chunk_record_bytes; }
 inline rill::format::WindowRecord window_of(const Bytes& bytes, uint32_t index) {
     return get<rill::format::WindowRecord>(bytes, windows_at(bytes) + index * rill::format::window_record_bytes);
+}
+/// Offsets of fields in the record of a chunk, and that record without what no test asks for.
+enum ChunkField : size_t { field_bytes = 0, field_crc = 4, field_layer = 8, field_block = 9, field_points = 10, field_drops = 13,
+                           field_coefficients = 16, field_lower = 20, field_upper = 26, field_spacing = 32 };
+inline rill::format::ChunkRecord chunk_of(const Bytes& bytes, uint32_t index) {
+    const size_t at = chunk_at(bytes, index);
+    rill::format::ChunkRecord chunk{};
+    chunk.bytes = get<uint32_t>(bytes, at + field_bytes), chunk.crc = get<uint32_t>(bytes, at + field_crc);
+    chunk.layer = bytes[at + field_layer], chunk.block = bytes[at + field_block];
+    uint32_t window = 0;
+    while (index >= window_of(bytes, window).first_chunk + window_of(bytes, window).chunk_count) ++window;
+    chunk.offset = window_of(bytes, window).offset;
+    for (uint32_t i = window_of(bytes, window).first_chunk; i < index; ++i) chunk.offset += get<uint32_t>(bytes, chunk_at(bytes, i) + field_bytes);
+    return chunk;
 }
 /// Makes the checksums of header and directory right again after a change.
 inline void seal(Bytes& bytes) {

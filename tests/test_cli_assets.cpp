@@ -18,7 +18,7 @@ TEST_CASE("info") {
     CHECK(json["file_bytes"] == fs::file_size(clip().asset));
     CHECK(json["windows"].size() >= 2);
     check_bytes(clip().asset);
-    for (const char* kind : {"heads", "structure", "births", "first_coefficients", "motion", "normals"}) CHECK(json["bytes"]["layers"][0][kind] > 0);
+    for (const char* kind : {"structure", "births", "first_coefficients", "motion", "normals"}) CHECK(json["bytes"]["layers"][0][kind] > 0);
 }
 
 TEST_CASE("assets that are none: 2, whatever the command") {

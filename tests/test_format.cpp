@@ -174,7 +174,7 @@ TEST_CASE("every rule of the directory is kept") {
     Clip clip = small_clip();
     clip.uneven = true;
     const Bytes good = make_ball(clip);
-    const size_t w = windows_at(good), c = chunks_at(good), c1 = c + chunk_record_bytes;
+    const size_t w = windows_at(good), w1 = w + window_record_bytes, c = chunks_at(good);
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     refused(good, offsetof(Header, header_bytes), 129u, "header has a wrong size or reserved field");
     refused(good, offsetof(Header, directory_bytes), 0xFFFFFFFFu, "directory does not fit in the file");
@@ -190,20 +190,28 @@ TEST_CASE("every rule of the directory is kept") {
     refused(good, offsetof(Header, lower), 1e9f, "bounds are not a box");
     refused(good, header_bytes + 8, -1.0, "a frame time is out of range");
     refused(good, header_bytes + 16, clip.seconds(1), "frame times do not ascend");
-    refused(good, w, 1u, "windows do not follow each other in time");
-    refused(good, w + 4, 66u, "windows do not follow each other in time");
-    refused(good, w + 12, 0xFFFFFFFFu, "windows do not share out the chunks");
-    refused(good, w + 16, 257u, "a window's block count is out of range");
-    refused(good, c, uint64_t(0), "a chunk lies outside the file or over another part of it");
-    refused(good, c1, chunk_of(good, 0).offset, "a chunk lies outside the file or over another part of it");
-    refused(good, c + 8, 0xFFFFFFFFu, "a chunk lies outside the file or over another part of it");
-    refused(good, c + 12, 1u, "content hash does not match the chunks");
-    refused(good, c + 16, uint16_t(2), "a chunk's layer or block is out of range");
-    refused(good, c + 18, uint16_t(1), "chunks of a window are not in order of layer and block");
-    refused(good, c + 20, 1u << 21, "a chunk claims more tracks than its bytes can hold");
-    refused(good, c + 28, 0xFFFFFFFFu, "a chunk claims more coefficients than its bytes can hold");
-    refused(good, c + 32, nan, "a chunk's bounds are not a box");
-    refused(good, c + 56, -1.0f, "a chunk's spacing or error is not a length");
+    refused(good, w + offsetof(WindowRecord, first_sample), 1u, "windows do not follow each other in time");
+    refused(good, w + offsetof(WindowRecord, sample_count), 66u, "windows do not follow each other in time");
+    refused(good, w + offsetof(WindowRecord, chunk_count), 0xFFFFFFFFu, "windows do not share out the chunks");
+    refused(good, w + offsetof(WindowRecord, block_count), uint16_t(257), "a window's block count is out of range");
+    refused(good, w + offsetof(WindowRecord, ratio), uint16_t(15), "a window's steps are not sensible");
+    refused(good, w + offsetof(WindowRecord, step), 0.0f, "a window's steps are not sensible");
+    refused(good, w + offsetof(WindowRecord, normal_step), nan, "a window's steps are not sensible");
+    refused(good, w + offsetof(WindowRecord, slip_step), -1.0f, "a window's steps are not sensible");
+    refused(good, w + offsetof(WindowRecord, offset), uint64_t(0), "a chunk lies outside the file or over another part of it");
+    refused(good, w + offsetof(WindowRecord, offset), ~uint64_t(0), "a chunk lies outside the file or over another part of it");
+    refused(good, w1 + offsetof(WindowRecord, offset), window_of(good, 0).offset, "a chunk lies outside the file or over another part of it");
+    refused(good, c + field_bytes, 0xFFFFFFFFu, "a chunk lies outside the file or over another part of it");
+    refused(good, c + field_bytes, 0u, "a chunk lies outside the file or over another part of it");
+    refused(good, c + field_crc, 1u, "content hash does not match the chunks");
+    refused(good, c + field_layer, uint8_t(2), "a chunk's layer or block is out of range");
+    refused(good, c + field_block, uint8_t(1), "chunks of a window are not in order of layer and block");
+    refused(good, c + field_points + 2, uint8_t(0x20), "a chunk claims more tracks than its bytes can hold");
+    refused(good, c + field_drops + 2, uint8_t(0x20), "a chunk claims more tracks than its bytes can hold");
+    refused(good, c + field_coefficients, 0xFFFFFFFFu, "a chunk claims more coefficients than its bytes can hold");
+    refused(good, c + field_lower, int16_t(32767), "a chunk's bounds are not a box");
+    refused(good, c + field_spacing, uint16_t(0xBF80), "a chunk's spacing or error is not a length");  // −1
+    refused(good, c + field_spacing + 2, uint16_t(0x7F80), "a chunk's spacing or error is not a length");  // infinite
     const size_t settings = header_bytes + header_of(good).directory_bytes - 4;
     refused(good, settings, '\x1b', "settings are not printable text");
     refused(good, settings, '\xff', "settings are not printable text");
@@ -270,6 +278,57 @@ TEST_CASE("an asset appears whole or not at all") {
     CHECK(std::filesystem::exists(path));
     std::filesystem::remove(path);
     CHECK(nothing_left(path));
+}
+
+TEST_CASE("stored bounds hold what a chunk does, and stay what they are when windows are copied") {
+    using namespace rill::cooker;
+    Clip clip = small_clip();
+    clip.across = 3, clip.points = 300;  // many boxes
+    const std::string path = scratch_path("bounds.rill"), copy = scratch_path("copy.rill");
+    write_ball(clip, path);
+    const AssetDirectory directory = read_directory(path);
+    const double unit = rill::format::bounds_unit(directory.header);
+    CHECK(unit < 0.1 * clip.cell);
+    const std::vector<ChunkToWrite> given = ball_chunks(clip, 0, 5);
+    REQUIRE(directory.windows[0].chunk_count == given.size());
+    for (size_t i = 0; i < given.size(); ++i)
+        for (int a = 0; a < 3; ++a) {
+            const rill::format::ChunkRecord& stored = directory.chunks[i];
+            CHECK(stored.lower[a] <= given[i].lower[a]);
+            CHECK(stored.lower[a] > given[i].lower[a] - 1.01 * unit);
+            CHECK(stored.upper[a] >= given[i].upper[a]);
+            CHECK(stored.upper[a] < given[i].upper[a] + 1.01 * unit);
+            CHECK(stored.spacing == doctest::Approx(given[i].spacing).epsilon(0.004));
+        }
+    AssetWriter writer(copy);
+    writer.append(directory, 0);
+    writer.finish(ball_facts(clip));
+    CHECK(read_file(copy) == read_file(path));
+    std::filesystem::remove(path), std::filesystem::remove(copy);
+}
+
+TEST_CASE("what the directory cannot say is not written") {
+    using namespace rill::cooker;
+    const Clip clip = small_clip();
+    const std::string path = scratch_path("none.rill"), sorry = path + ": cannot be stored as an asset: ";
+    const auto written = [&](const std::function<void(ChunkToWrite&, AssetFacts&)>& spoil) {
+        AssetWriter writer(path);
+        std::vector<ChunkToWrite> chunks = ball_chunks(clip, 0, clip.frames);
+        AssetFacts facts = ball_facts(clip);
+        spoil(chunks[1], facts);
+        writer.add_window(0, clip.frames, 2, std::move(chunks));
+        writer.finish(facts);
+    };
+    CHECK_THROWS_WITH_AS(written([](ChunkToWrite& c, AssetFacts&) { c.upper.y = 1000; }), (sorry + "a chunk reaches far out of the bounds").c_str(), InputError);
+    CHECK_THROWS_WITH_AS(written([](ChunkToWrite& c, AssetFacts&) { c.encoded.shape.steps.step *= 2; }),
+                         (sorry + "the chunks of a window have different steps").c_str(), InputError);
+    CHECK_THROWS_WITH_AS(written([](ChunkToWrite&, AssetFacts& facts) { facts.lower.x -= 1; }),
+                         (sorry + "its positions are told from different places").c_str(), InputError);
+    CHECK_FALSE(std::filesystem::exists(path));
+    CHECK_FALSE(std::filesystem::exists(path + ".spool"));
+    written([](ChunkToWrite&, AssetFacts&) {});
+    CHECK(std::filesystem::exists(path));
+    std::filesystem::remove(path);
 }
 
 TEST_CASE("a full disk is reported") {

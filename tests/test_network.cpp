@@ -191,12 +191,18 @@ TEST_CASE("a file of a gigabyte: only its directory is read, and what it takes i
     const rill::format::Header h = header_of(bytes);
     constexpr uint64_t file_bytes = 1 << 30;
     std::map<uint64_t, uint64_t> original;  // offset in the large file → in the small one
-    for (uint32_t i = 0; i < h.chunk_count; ++i) {
-        rill::format::ChunkRecord chunk = chunk_of(bytes, i);
-        const uint64_t far = file_bytes / h.chunk_count * (i + 1) - chunk.bytes;
-        original[far] = chunk.offset;
-        put(bytes, chunks_at(bytes) + i * rill::format::chunk_record_bytes, far);
+    std::vector<std::pair<size_t, uint64_t>> moved;
+    for (uint32_t i = 0; i < h.window_count; ++i) {
+        const rill::format::WindowRecord window = window_of(bytes, i);
+        const rill::format::ChunkRecord last = chunk_of(bytes, window.first_chunk + window.chunk_count - 1);
+        const uint64_t far = file_bytes / h.window_count * (i + 1) - (last.offset + last.bytes - window.offset);
+        for (uint32_t k = 0; k < window.chunk_count; ++k) {
+            const uint64_t near = chunk_of(bytes, window.first_chunk + k).offset;
+            original[far + near - window.offset] = near;
+        }
+        moved.emplace_back(windows_at(bytes) + i * rill::format::window_record_bytes, far);
     }
+    for (const auto& [at, far] : moved) put(bytes, at, far);
     put(bytes, offsetof(rill::format::Header, file_bytes), file_bytes);
     seal(bytes);
     struct Sparse {

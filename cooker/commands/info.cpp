@@ -66,7 +66,7 @@ nlohmann::json describe(const std::string& path) {
     char hash[17];
     std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(h.content_hash));
     return {{"report", "rill info"},
-            {"version", 1},
+            {"version", 2},
             {"asset", path},
             {"format", h.version},
             {"content_hash", hash},

@@ -5,6 +5,7 @@
 
 #include "format/crc32.h"
 #include "format/cursor.h"
+#include "format/lattice.h"
 
 namespace rill::format {
 namespace {
@@ -120,7 +121,8 @@ const char* window_fault(const Header& h, const WindowRecord* windows) {
         if (w.first_chunk != chunk || w.chunk_count > h.chunk_count - chunk)
             return "windows do not share out the chunks";
         chunk += w.chunk_count;
-        if (w.block_count > max_blocks || w.reserved != 0) return "a window's block count is out of range";
+        if (w.block_count > max_blocks) return "a window's block count is out of range";
+        if (w.chunk_count && !valid(steps_of(h, w))) return "a window's steps are not sensible";
     }
     if (sample != uint64_t(h.frame_count) - 1) return "windows do not end with the last frame";
     if (chunk != h.chunk_count) return "windows do not share out the chunks";
@@ -138,7 +140,7 @@ const char* chunk_fault(const Header& h, const WindowRecord& w, const ChunkRecor
     if (c.coefficient_count > most || c.coefficient_count > uint64_t(c.bytes) * most_coefficients_per_byte)
         return "a chunk claims more coefficients than its bytes can hold";
     if (!is_box(c.lower, c.upper)) return "a chunk's bounds are not a box";
-    if (!is_extent(c.spacing) || !is_extent(c.error_mean) || !is_extent(c.error_p99) || c.reserved != 0)
+    if (!is_extent(c.spacing) || !is_extent(c.error_mean) || !is_extent(c.error_p99))
         return "a chunk's spacing or error is not a length";
     return nullptr;
 }
@@ -150,7 +152,8 @@ const char* chunks_fault(const Header& h, const DirectoryTables& tables) {
         const WindowRecord& w = tables.windows[i];
         int64_t before = -1;
         for (uint32_t k = 0; k < w.chunk_count; ++k) {
-            const ChunkRecord& c = tables.chunks[w.first_chunk + k];
+            ChunkRecord& c = tables.chunks[w.first_chunk + k];
+            c.offset = k ? free_from : w.offset;
             if (const char* fault = chunk_fault(h, w, c, free_from)) return fault;
             const int64_t place = int64_t(c.layer) << 16 | c.block;
             if (place <= before) return "chunks of a window are not in order of layer and block";
@@ -166,29 +169,32 @@ void read_tables(const Header& h, Cursor& cursor, DirectoryTables& out) {
     for (uint32_t i = 0; i < h.frame_time_count; ++i) out.frame_times[i] = cursor.f64();
     for (uint32_t i = 0; i < h.window_count; ++i) {
         WindowRecord& w = out.windows[i];
+        w.offset = cursor.u64();
         w.first_sample = cursor.u32();
         w.sample_count = cursor.u32();
         w.first_chunk = cursor.u32();
         w.chunk_count = cursor.u32();
-        w.block_count = cursor.u32();
-        w.reserved = cursor.u32();
+        w.block_count = cursor.u16();
+        w.ratio = cursor.u16();
+        w.step = cursor.f32();
+        w.normal_step = cursor.f32();
+        w.slip_step = cursor.f32();
     }
     for (uint32_t i = 0; i < h.chunk_count; ++i) {
         ChunkRecord& c = out.chunks[i];
-        c.offset = cursor.u64();
+        c.offset = 0;  // known once the windows are checked
         c.bytes = cursor.u32();
         c.crc = cursor.u32();
-        c.layer = cursor.u16();
-        c.block = cursor.u16();
-        c.point_count = cursor.u32();
-        c.drop_count = cursor.u32();
+        c.layer = cursor.u8();
+        c.block = cursor.u8();
+        c.point_count = cursor.u24();
+        c.drop_count = cursor.u24();
         c.coefficient_count = cursor.u32();
-        read_vector(cursor, c.lower);
-        read_vector(cursor, c.upper);
-        c.spacing = cursor.f32();
-        c.error_mean = cursor.f32();
-        c.error_p99 = cursor.f32();
-        c.reserved = cursor.u32();
+        for (int a = 0; a < 3; ++a) c.lower[a] = bound_at(h, a, cursor.i16());
+        for (int a = 0; a < 3; ++a) c.upper[a] = bound_at(h, a, cursor.i16());
+        c.spacing = cursor.f16();
+        c.error_mean = cursor.f16();
+        c.error_p99 = cursor.f16();
     }
     out.model = cursor.take(h.model_bytes);
     out.settings = cursor.take(h.settings_bytes);

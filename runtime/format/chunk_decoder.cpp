@@ -7,13 +7,11 @@ namespace rill::format {
 namespace {
 
 const char* decode(const uint8_t* bytes, size_t size, const ChunkShape& shape, TrackBlock& block) {
-    if (size < lattice_steps_bytes) return "the chunk is shorter than its head";
-    const LatticeSteps steps = read_steps(bytes);
-    if (!valid(steps)) return "the chunk's steps are not sensible";
-    RangeDecoder coder(bytes + lattice_steps_bytes, bytes + size);
+    if (!valid(shape.steps)) return "the window's steps are not sensible";
+    RangeDecoder coder(bytes, bytes + size);
     Statistics learned = first_statistics;
-    if (const char* why = walk_chunk(coder, steps, shape, block, learned)) return why;
-    finish_block(steps, block);
+    if (const char* why = walk_chunk(coder, shape, block, learned)) return why;
+    finish_block(shape.steps, block);
     return nullptr;
 }
 

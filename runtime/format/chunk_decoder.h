@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "format/lattice.h"
 #include "format/tracks.h"
 #include "rill/rill.h"
 
@@ -12,6 +13,7 @@ namespace rill::format {
 struct ChunkShape {          ///< from the directory, already checked
     uint32_t sample_count;   ///< of the window
     uint32_t point_count, drop_count, coefficient_count;
+    LatticeSteps steps;      ///< of the window
 };
 /// Fills block.tracks (point_count + drop_count) and block.coefficients (coefficient_count), which
 /// the caller sized from the shape. Any bytes are safe: anything that does not decode to exactly this

@@ -3,7 +3,7 @@
 // `value` and returns it, or ignores it and returns the decoded bit. The decoder and the encoder therefore
 // see the same contexts by construction.
 //
-// A chunk is: LatticeSteps (22 bytes), then range-coded points, then drops. Each set is a count-coded k-d
+// A chunk is: range-coded points, then drops. Each set is a count-coded k-d
 // tree over lattice points (Devillers & Gandoin 2000), whose leaves, in Morton order, carry their track at
 // once, so that everything decoded before helps with what comes next. See FORMAT.md, "Chunk".
 #pragma once
@@ -59,6 +59,16 @@ public:
         uint32_t out = 0;
         for (uint32_t b = bits; b-- > 0;) out = out << 1 | coder_.bit(32768, value >> b & 1);
         return out;
+    }
+
+    /// Any number, at even odds: how many bits it takes first, the lowest for its sign.
+    int32_t number(int32_t value) {
+        const uint32_t coded = uint32_t(value) << 1 ^ (value < 0 ? ~0u : 0u);
+        uint32_t bits = 0;
+        while (bits < 32 && coded >> bits) ++bits;
+        bits = raw(6, bits);
+        const uint32_t read = raw(bits > 32 ? 32 : bits, coded);
+        return int32_t(read >> 1 ^ (read & 1 ? ~0u : 0u));
     }
 
 private:
@@ -156,7 +166,8 @@ private:
     };
     uint32_t leaf_bit(const Box& box, uint32_t dimension, const Planes& planes, uint32_t value);
     bool track(uint32_t index, const Box& box, const RawTrack* source);
-    bool life(RawTrack& t, const Near& near, const RawTrack* source);
+    uint32_t moment(uint32_t which, uint32_t from, uint32_t last, const Near& near, uint32_t wanted);
+    void life(RawTrack& t, const Near& near, const RawTrack* source);
     bool axis(RawTrack& t, const Near& near, const RawTrack* source);
     void along_axis(RawTrack& t, const Frame& frame, const Near& near, const RawTrack* source);
     /// Predictions of one coefficient by the neighbours, in 1/256 of it.

@@ -162,9 +162,33 @@ void ChunkModel<Coder>::leaf(Box& box, const RawTrack* source) {
     }
 }
 
+/// When a track is born (`which` 0) or dies (1; 2 if it was born in the window): sample by sample from `from`, is it then? `last` is what
+/// is left. Often it is when a neighbour is born, or dies, or where one takes over from the other.
+template <class Coder>
+uint32_t ChunkModel<Coder>::moment(uint32_t which, uint32_t from, uint32_t last, const Near& near, uint32_t wanted) {
+    const uint32_t death = which > 0;
+    Counter(&counters)[Mixer::inputs][Statistics::life_contexts] = learned_.life[death];
+    uint32_t s = from;
+    for (; s < last; ++s) {
+        uint32_t same = 0, meets = 0, away[2] = {7, 7};
+        for (uint32_t j = 0; j < near.count; ++j) {
+            const Track& other = block_.tracks[recent_.track[near.slot[j]]];
+            const int32_t its = int32_t(death ? other.death : other.birth) - int32_t(s);
+            const int32_t end = int32_t(death ? other.birth : other.death) - int32_t(s);
+            same += its == 0, meets += end >= -1 && end <= 1;
+            if (j < 2) away[j] = uint32_t((its < -3 ? -3 : its > 3 ? 3 : its) + 3);
+        }
+        const uint32_t done = s - from, left = at_most(last - s, 7);
+        if (bit(learned_.life_mixer[death], &counters[0][128 * (which == 2) + done], &counters[1][8 * away[0] + away[1]],
+                &counters[2][32 * same + 8 * meets + left], &counters[3][8 * at_most(done, 15) + away[0]], wanted == s))
+            break;
+    }
+    return s;
+}
+
 /// Birth, death, flags.
 template <class Coder>
-bool ChunkModel<Coder>::life(RawTrack& t, const Near& near, const RawTrack* source) {
+void ChunkModel<Coder>::life(RawTrack& t, const Near& near, const RawTrack* source) {
     const Track* like = near.count ? &block_.tracks[recent_.track[near.slot[0]]] : nullptr;
     const uint32_t last = samples_ - 1, set = drops_ ? 6 : 0;
     const uint32_t context = like ? 1 + (like->flags & 3) : 0;
@@ -173,23 +197,14 @@ bool ChunkModel<Coder>::life(RawTrack& t, const Near& near, const RawTrack* sour
     if (bit(learned_.flag[0][set + context], wanted & track_born)) t.flags |= track_born;
     if (bit(learned_.flag[1][set + context], (wanted & track_dies) != 0)) t.flags |= track_dies;
     const bool born = t.flags & track_born, dies = t.flags & track_dies;
-    if (!born && bit(learned_.at_border[0], source && source->birth == 0))
-        t.birth = 0;
-    else
-        t.birth = uint8_t(tree(learned_.birth, 7, source ? source->birth : 0));
-    if (!dies && bit(learned_.at_border[1], source && source->death == last))
-        t.death = uint8_t(last);
-    else
-        t.death = uint8_t(t.birth + tree(learned_.length, 7, source ? uint32_t(source->death - t.birth) : 0));
-    if (t.birth > t.death || t.death > last) {
-        reason = "a track lives outside its window";
-        return false;
-    }
+    const bool from_start = !born && bit(learned_.at_border[0], source && source->birth == 0);
+    t.birth = uint8_t(from_start ? 0 : moment(0, 0, last, near, source ? source->birth : 0));
+    const bool to_end = !dies && bit(learned_.at_border[1], source && source->death == last);
+    t.death = uint8_t(to_end ? last : moment(1 + born, t.birth, last, near, source ? source->death : 0));
     const uint32_t length = t.death - t.birth + 1u;
     if (length > 2 && bit(learned_.cosine[like && like->flags & track_cosine][at_most(length, 15)], (wanted & track_cosine) != 0))
         t.flags |= track_cosine;
     if (!drops_ && bit(learned_.fine, (wanted & track_fine) != 0)) t.flags |= track_fine;
-    return true;
 }
 
 /// Mean normal, against that of the nearest tracks, in the half of the octahedron theirs is in.
@@ -287,7 +302,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
     }
     measure(x);
     const Near near = find_near([](uint32_t) { return true; });
-    if (!life(t, near, source)) return false;
+    life(t, near, source);
     levels_ = axis_levels(steps_, t.death - t.birth + 1u);
     Frame frame = identity_frame;
     t.axis[0] = t.axis[1] = 0;

@@ -19,15 +19,16 @@ struct Statistics {
     static constexpr uint32_t bins = 8;  ///< of a value: zero, unary magnitude class up to 8
     static constexpr uint32_t contexts[Mixer::inputs] = {48, 49, 40, 48};  ///< per kind
     static constexpr uint32_t all_contexts = 48 + 49 + 40 + 48;
-    static constexpr uint32_t more_contexts = 72, leaf_contexts = 78;
+    static constexpr uint32_t more_contexts = 72, leaf_contexts = 78, life_contexts = 256;
 
     Counter values[kinds * all_contexts * bins];
     Counter mantissa[kinds][24], escape[24];
     Counter split_small[9][9], split_empty[2][16], split_tree[8][16];
     Counter leaf[Mixer::inputs][leaf_contexts];
-    Counter flag[2][12], cosine[2][16], fine, birth[128], length[128], at_border[2];
+    Counter flag[2][12], cosine[2][16], fine, at_border[2];
+    Counter life[2][Mixer::inputs][life_contexts];
     Counter more[4][Mixer::inputs][more_contexts];
-    Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4];
+    Mixer value_mixer[kinds][bins], leaf_mixer[3], more_mixer[4], life_mixer[2];
     /// How far predictions were right: Σ value · prediction / Σ prediction², in 1/256; drawn up anew now and then.
     struct Trust {
         int64_t product = 1 << 17, square = 1 << 18;
@@ -58,16 +59,17 @@ template <class S, class F>
 constexpr void each_part_of(S& s, F f) {
     each_part(s.values, f), each_part(s.mantissa, f), each_part(s.escape, f);
     each_part(s.split_small, f), each_part(s.split_empty, f), each_part(s.split_tree, f), each_part(s.leaf, f);
-    each_part(s.flag, f), each_part(s.cosine, f), each_part(s.fine, f), each_part(s.birth, f), each_part(s.length, f);
-    each_part(s.at_border, f), each_part(s.more, f);
-    each_part(s.value_mixer, f), each_part(s.leaf_mixer, f), each_part(s.more_mixer, f), each_part(s.trust, f);
+    each_part(s.flag, f), each_part(s.cosine, f), each_part(s.fine, f), each_part(s.at_border, f);
+    each_part(s.life, f), each_part(s.more, f);
+    each_part(s.value_mixer, f), each_part(s.leaf_mixer, f), each_part(s.more_mixer, f), each_part(s.life_mixer, f);
+    each_part(s.trust, f);
 }
 
 /// Reads chunk_priors: a letter is one of 52 levels, a dot is nothing known, a number after a dot says how many dots.
 class PriorReader {
 public:
     static constexpr int32_t unknown = -1;
-    static constexpr uint16_t seen = 6;  ///< as if so many bits had been met
+    static constexpr uint16_t seen = 10;  ///< as if so many bits had been met
     constexpr int32_t next() {
         if (dots_ > 0) return --dots_, unknown;
         const char c = next_char();

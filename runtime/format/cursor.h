@@ -29,10 +29,14 @@ struct Cursor {
     }
     uint8_t u8() noexcept { return static_cast<uint8_t>(little_endian(1)); }
     uint16_t u16() noexcept { return static_cast<uint16_t>(little_endian(2)); }
+    int16_t i16() noexcept { return static_cast<int16_t>(u16()); }
+    uint32_t u24() noexcept { return static_cast<uint32_t>(little_endian(3)); }
     uint32_t u32() noexcept { return static_cast<uint32_t>(little_endian(4)); }
     int32_t i32() noexcept { return static_cast<int32_t>(u32()); }
     uint64_t u64() noexcept { return little_endian(8); }
     float f32() noexcept { return reinterpret<float>(u32()); }
+    /// The upper half of an f32.
+    float f16() noexcept { return reinterpret<float>(uint32_t(u16()) << 16); }
     double f64() noexcept { return reinterpret<double>(u64()); }
 
 private:

@@ -78,7 +78,7 @@ struct Counter {
     uint16_t probability = 32768;  ///< of a 1, in 1/65536
     uint16_t seen = 0;
 };
-inline constexpr uint32_t counter_limit = 40;
+inline constexpr uint32_t counter_limit = 60;
 /// By how often a counter was used: how fast it learns, in 1/32768; and how far it is trusted, in 1/256, for a
 /// context never met says nothing.
 struct Pace {

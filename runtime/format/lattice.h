@@ -11,17 +11,19 @@
 
 namespace rill::format {
 
-/// Quantiser steps as the chunk head holds them. 26 bytes: step, normal_step, origin as binary32, ratio, slip_step.
+/// Quantiser steps of a window.
 struct LatticeSteps {
     float step;         ///< normal direction, metres; of a life of eight samples, see life_scales
     float normal_step;  ///< normals, radians; likewise
-    float origin[3];
+    float origin[3];    ///< the low corner of the file's bounds
     uint16_t ratio;  ///< tangential step / step, in 1/16: 16 … 1024
     float slip_step = 0;  ///< of slip, m/s; 0: points have none
 };
-inline constexpr uint32_t lattice_steps_bytes = 26;
 /// Finite, positive, ratio in range; says nothing else of the values.
 bool valid(const LatticeSteps& steps) noexcept;
+inline LatticeSteps steps_of(const Header& h, const WindowRecord& w) noexcept {
+    return {w.step, w.normal_step, {h.lower[0], h.lower[1], h.lower[2]}, w.ratio, w.slip_step};
+}
 
 /// Largest integer whose square is no more than x.
 constexpr int64_t whole_root(int64_t x) {

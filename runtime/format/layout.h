@@ -17,7 +17,8 @@ enum Version : uint32_t {
     version_1 = 1,  ///< 2026-11: first
     version_2 = 2,  ///< 2026-11: slip: points follow the surface, and say how the liquid slides under them
     version_3 = 3,  ///< 2026-11: steps depend on the life of a track
-    current_version = version_3,
+    version_4 = 4,  ///< 2026-11: smaller records, steps by window; lives by their neighbours'
+    current_version = version_4,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.
@@ -59,18 +60,20 @@ static_assert(sizeof(Header) == header_bytes, "the struct is the byte layout");
 
 /// One span of time, decodable alone: frames first_sample … first_sample + sample_count − 1.
 /// Neighbouring windows share their border frame (the last sample of one = the first of the next).
-struct WindowRecord {           // 24 bytes
+struct WindowRecord {           // 40 bytes
+    uint64_t offset;            ///< of its first chunk, from the start of the file; the others follow without gaps
     uint32_t first_sample;      ///< index of a frame, 0 … frame_count−1
     uint32_t sample_count;      ///< 1 … max_window_samples
     uint32_t first_chunk;       ///< into the chunk table
     uint32_t chunk_count;       ///< may be 0: no surface at all in this span
-    uint32_t block_count;
-    uint32_t reserved;          ///< 0
+    uint16_t block_count;       ///< ≤ max_blocks
+    uint16_t ratio;             ///< of its chunks, as what follows: format/lattice.h, LatticeSteps
+    float step, normal_step, slip_step;
 };
 
-/// One (window, layer, block). Chunks of a window are sorted by layer, then block.
-struct ChunkRecord {            // 72 bytes
-    uint64_t offset;            ///< from the start of the file
+/// One (window, layer, block). Chunks of a window are sorted by layer, then block. As read; in the file it is narrower.
+struct ChunkRecord {
+    uint64_t offset;            ///< from the start of the file: follows from its window and the chunks before it
     uint32_t bytes;
     uint32_t crc;               ///< CRC-32 of the chunk bytes
     uint16_t layer;
@@ -82,15 +85,20 @@ struct ChunkRecord {            // 72 bytes
     float spacing;              ///< typical distance between neighbouring points, this and coarser layers
     float error_mean;           ///< measured with this layer and all coarser ones, metres, window mean
     float error_p99;            ///< likewise the 99th percentile
-    uint32_t reserved;          ///< 0
 };
+/// Bounds of chunks are whole numbers of these, 16 bits, from the low corner of the file's: they may lie well outside them.
+inline double bounds_unit(const Header& h) {
+    float extent = 0;
+    for (int a = 0; a < 3; ++a) extent = h.upper[a] - h.lower[a] > extent ? h.upper[a] - h.lower[a] : extent;
+    return (double(extent) + 64 * double(h.cell_size)) / 16384;
+}
+inline float bound_at(const Header& h, int axis, int16_t units) { return float(h.lower[axis] + bounds_unit(h) * units); }
 /// In cells: a layer whose p99 is no more is fine enough to be drawn with them. dam_break from 4 diagonals, cells of 2 pixels: with 1
 /// cell the drawn surface was off by a p99 of 2.6 pixels for no fewer triangles; with .65 of 1.0 at most, with .5 of .8.
 inline constexpr float fine_enough = 0.5f;
 
-inline constexpr uint32_t window_record_bytes = 24;
-inline constexpr uint32_t chunk_record_bytes = 72;
-static_assert(sizeof(WindowRecord) == window_record_bytes && sizeof(ChunkRecord) == chunk_record_bytes,
-              "the structs are the byte layout");
+inline constexpr uint32_t window_record_bytes = 40;
+inline constexpr uint32_t chunk_record_bytes = 38;
+static_assert(sizeof(WindowRecord) == window_record_bytes, "the struct is the byte layout");
 
 }  // namespace rill::format

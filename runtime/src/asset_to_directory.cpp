@@ -75,7 +75,7 @@ void sum_up_windows(Directory& d) {
         const WindowNeed need = need_of(d.tables, w);
         d.info.most_points = std::max(d.info.most_points, saturate(need.points + need.drops));
         d.info.largest_window_bytes = std::max(d.info.largest_window_bytes, need.bytes);
-        d.info.blocks = std::max(d.info.blocks, w.block_count);
+        d.info.blocks = std::max(d.info.blocks, uint32_t(w.block_count));
         d.most_point_tracks = std::max(d.most_point_tracks, saturate(need.points));
         d.most_drop_tracks = std::max(d.most_drop_tracks, saturate(need.drops));
         d.most_chunks = std::max(d.most_chunks, w.chunk_count);

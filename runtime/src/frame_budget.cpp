@@ -62,7 +62,7 @@ void find_places(const Directory& directory, const Plan& plan, Places& places) {
         points[chunk.block] += float(chunk.point_count);
         finest[chunk.block] = &chunk;  // they ascend by layer
     }
-    const int samples = std::clamp(int(std::cbrt(float(most_places) / float(std::max(w.block_count, 1u)))), 1, 6);
+    const int samples = std::clamp(int(std::cbrt(float(most_places) / float(std::max(uint32_t(w.block_count), 1u)))), 1, 6);
     for (uint32_t b = 0; b < w.block_count; ++b)
         if (finest[b]) add_block(plan, *finest[b], points[b], samples, places);
 }

@@ -37,7 +37,7 @@ void decode_chunk(Player& player, uint32_t index) {
     if (format::crc32(bytes, record.bytes) == record.crc) {
         slot.fault = "does not decode";
         const format::ChunkShape shape{window.sample_count, record.point_count, record.drop_count,
-                                       record.coefficient_count};
+                                       record.coefficient_count, format::steps_of(directory.header, window)};
         status = format::decode_chunk(bytes, record.bytes, shape, directory.tables.model,
                                       directory.header.model_bytes, block, &slot.fault);
     }

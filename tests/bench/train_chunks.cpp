@@ -42,17 +42,18 @@ struct Sums {
     void operator()(const format::Statistics::Trust& trust) { add(trust.factor / 5.0, trust.seen); }
 };
 
-void learn(const AssetDirectory& directory, uint32_t chunk, uint32_t samples, Sums& sums) {
+void learn(const AssetDirectory& directory, uint32_t chunk, const format::WindowRecord& window, Sums& sums) {
     const format::ChunkRecord& record = directory.chunks[chunk];
     const std::vector<uint8_t> bytes = rill::cooker::read_chunk(directory, chunk);
     std::vector<format::Track> tracks(record.point_count + record.drop_count);
     std::vector<float> coefficients(record.coefficient_count);
     format::TrackBlock block{{}, 0, record.point_count, record.drop_count, record.coefficient_count, tracks.data(), coefficients.data()};
-    const format::LatticeSteps steps = format::read_steps(bytes.data());
-    format::RangeDecoder coder(bytes.data() + format::lattice_steps_bytes, bytes.data() + bytes.size());
+    const format::ChunkShape shape{window.sample_count, record.point_count, record.drop_count, record.coefficient_count,
+                                   steps_of(directory.header, window)};
+    format::RangeDecoder coder(bytes.data(), bytes.data() + bytes.size());
     static format::Statistics learned;
     learned = format::first_statistics;
-    if (const char* why = format::walk_chunk(coder, steps, {samples, record.point_count, record.drop_count, record.coefficient_count}, block, learned))
+    if (const char* why = format::walk_chunk(coder, shape, block, learned))
         throw rill::cooker::InputError(directory.path + ": " + why);
     sums.at = 0;
     format::each_part_of(learned, [&](auto& part) { sums(part); });
@@ -86,7 +87,7 @@ int main(int count, char** arguments) try {
     for (int a = 1; a < count; ++a) {
         const AssetDirectory directory = rill::cooker::read_directory(arguments[a]);
         for (const format::WindowRecord& window : directory.windows)
-            for (uint32_t c = 0; c < window.chunk_count; ++c) learn(directory, window.first_chunk + c, window.sample_count, sums);
+            for (uint32_t c = 0; c < window.chunk_count; ++c) learn(directory, window.first_chunk + c, window, sums);
     }
     if (sums.means.empty()) throw rill::cooker::InputError("usage: rill-train-chunks ASSET...");
     write(sums.means);
