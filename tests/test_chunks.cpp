@@ -183,6 +183,24 @@ TEST_CASE("tracks that are born and die together cost less than those that do so
     CHECK(life_bits(false) > 5);
 }
 
+TEST_CASE("motion is foretold by neighbours of the same time, not by those of another") {
+    const auto motion_bits = [](bool two_times) {
+        std::mt19937 random(13);
+        std::uniform_real_distribution<float> unit(-1, 1);
+        std::vector<QuantisedTrack> tracks;
+        for (int i = 0; i < 600; ++i) {
+            const bool late = two_times && random() % 2;
+            TrackSamples track;
+            track.birth = late ? 12 : 0, track.death = late ? 23 : 11, track.flags = late ? format::track_born : format::track_dies;
+            const glm::vec3 start(unit(random), unit(random), 0), way = late ? glm::vec3(-0.7f, 0.8f, 0) : glm::vec3(1, 0.5f, 0);
+            for (int s = 0; s < 12; ++s) track.position.push_back(origin + start + 0.05f * float(s) * way), track.normal.emplace_back(0, 0, 1);
+            tracks.push_back(quantise_track(track, quantiser, origin, tables()));
+        }
+        return encode(tracks).bits.motion / double(tracks.size());
+    };
+    CHECK(motion_bits(true) < 1.5 * motion_bits(false));
+}
+
 TEST_CASE("the bytes do not depend on the order of the tracks, nor on the run") {
     auto tracks = make_tracks(300, 20);
     for (int i = 0; i < 4; ++i) {  // several tracks on one lattice point

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "basis_tables.h"
+#include "format/carried_motion.h"
 
 using namespace rill::format;
 
@@ -74,6 +75,32 @@ TEST_CASE("the functions are orthonormal on the samples of every life length") {
             INFO("samples ", samples, cosine ? " cosine" : " extension");
             CHECK(worst < 3e-7);  // what rounding to float leaves
         }
+}
+
+TEST_CASE("the polynomials that carry motion: orthonormal at every length, and close to the first terms of both bases") {
+    constexpr double unit = 4096;
+    for (uint32_t n = 2; n <= Polynomials::most; ++n) {
+        const auto* p = polynomials.of(n);
+        for (uint32_t k = 0; k < carried_terms && k + 1 < n; ++k)
+            for (uint32_t l = 0; l <= k; ++l) {
+                double product = 0, mean = 0;
+                for (uint32_t s = 0; s < n; ++s) product += p[s][k] * p[s][l] / unit / unit / n, mean += p[s][k] / unit / n;
+                CAPTURE(n);
+                CHECK(std::abs(product - (k == l)) < 1e-3);
+                CHECK(std::abs(mean) < 1e-3);
+            }
+        for (uint32_t k = n - 1; k < carried_terms; ++k)
+            for (uint32_t s = 0; s < n; ++s) CHECK(p[s][k] == 0);
+        for (const bool cosine : {false, true})
+            for (uint32_t k = 1; k <= carried_terms && k < most_terms(n, cosine); ++k) {
+                double product = 0;
+                for (uint32_t s = 0; s < n; ++s)
+                    product += p[s][k - 1] / unit / std::sqrt(double(n)) * row(n, cosine, s, k + 1).value[k];
+                CAPTURE(n);
+                CAPTURE(k);
+                CHECK(product * polynomial_sign(k, cosine ? track_cosine : 0) > (cosine ? 0.78 : 0.98));
+            }
+    }
 }
 
 TEST_CASE("closed forms: constant and straight lines at every length, in one and two terms") {

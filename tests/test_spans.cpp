@@ -20,7 +20,7 @@ namespace {
 constexpr int frames = 13;  // in windows of 1, spans of 4: three spans
 
 Mesh of_frame(int i) {
-    Mesh mesh = bumpy_sphere(24, 0.5f, {0.03f * float(i), 0.02f * float(i % 5), 0.5f});
+    Mesh mesh = bumpy_sphere(12, 0.5f, {0.03f * float(i), 0.02f * float(i % 5), 0.5f});
     mesh.velocities.assign(mesh.positions.size(), {0.03f * 24, 0, 0});
     return mesh;
 }

@@ -132,7 +132,7 @@ private:
     struct Recent {
         uint32_t count = 0;              ///< slots in use
         int16_t place[3][window];        ///< mean positions, coarse
-        bool moves[window];              ///< lives for more than a sample
+        uint8_t birth[window], death[window];
         int32_t mean[window][3];         ///< step/16
         int16_t normal[window][3];       ///< of points, 1/16384
         uint32_t track[window];
@@ -148,8 +148,9 @@ private:
     void coarse_place(const int64_t (&x)[3], int16_t (&out)[3]) const;
     void remember(uint32_t index, const RawTrack& t, const Frame& frame);
     void measure(const int64_t (&x)[3]);
-    template <class Accept>
-    Near find_near(const Accept& accept) const;
+    template <class Score>
+    Near find_near(const uint32_t (&distance)[window], const Score& score) const;
+    Near find_moving(uint8_t birth, uint8_t death) const;
 
     // ---- parts of a track --------------------------------------------------------------------------
     struct Box {
@@ -177,7 +178,7 @@ private:
     };
     /// A channel group while it is coded; residuals of the last two terms.
     struct Terms {
-        const Near& moving;  ///< the nearest that live for more than a sample
+        const Near& moving;  ///< from find_moving()
         bool second;
         uint32_t channels;
         int32_t previous[6], before[6];
@@ -201,6 +202,7 @@ private:
     uint8_t rest_[2][rest_terms][3];  ///< of the track at hand
     uint8_t slip_rest_ = 0;
     int64_t carried_[nearest][carried_terms][3];  ///< its motion as its neighbours' says, terms 1 …, in 1/256
+    int64_t carried_share_[nearest];  ///< in 1/65536
     Recent recent_;
     int64_t search_low_[3];
     uint32_t search_shift_ = 0;

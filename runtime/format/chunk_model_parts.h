@@ -55,7 +55,7 @@ void ChunkModel<Coder>::remember(uint32_t index, const RawTrack& t, const Frame&
     }
     coarse_place(mean, place);
     for (int c = 0; c < 3; ++c) recent_.place[c][slot] = place[c];
-    recent_.moves[slot] = t.birth < t.death;
+    recent_.birth[slot] = t.birth, recent_.death[slot] = t.death;
     recent_.track[slot] = index;
     std::memcpy(recent_.rest[slot], rest_, sizeof rest_);
     recent_.slip_rest[slot] = slip_rest_;
@@ -74,15 +74,16 @@ void ChunkModel<Coder>::measure(const int64_t (&x)[3]) {
     }
 }
 
-/// The nearest of the last measure() whose slot is accepted, ties by slot.
+/// The nearest by score(slot, distance), which is no less than the distance, ties by slot; UINT32_MAX: never.
 template <class Coder>
-template <class Accept>
-typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_near(const Accept& accept) const {
+template <class Score>
+typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_near(const uint32_t (&distance)[window], const Score& score) const {
     Near near;
     uint32_t limit = UINT32_MAX;
     for (uint32_t i = 0; i < recent_.count; ++i) {
-        const uint32_t d = distance_[i];
-        if (d >= limit || !accept(i)) continue;
+        if (distance[i] >= limit) continue;
+        const uint32_t d = score(i, distance[i]);
+        if (d >= limit) continue;
         uint32_t at = near.count < nearest ? near.count++ : nearest - 1;
         for (; at > 0 && d < near.distance[at - 1]; --at)
             near.distance[at] = near.distance[at - 1], near.slot[at] = near.slot[at - 1];
@@ -90,6 +91,28 @@ typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_near(const Accept& acce
         if (near.count == nearest) limit = near.distance[nearest - 1];
     }
     return near;
+}
+
+/// Those whose motion says most about a life: that live, and move, through half of it at least, and the more the two lives share the better.
+/// (The nearest that move at any time: +1.6 % bytes (dam_break), +2.1 % (drop_splash), +.9 % (pour_sphere); through half of it, however
+/// much: +.3, +.6, +.2 %.)
+template <class Coder>
+typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_moving(uint8_t birth, uint8_t death) const {
+    const uint8_t life = uint8_t(death - birth + 1), least = uint8_t((life + 1) / 2);
+    // Which are ruled out, all at once and in bytes: asked one by one, half of them are, at random.
+    uint8_t shared[window], ruled_out[window];
+    uint32_t distance[window];
+    for (uint32_t i = 0; i < window; ++i) {
+        const uint8_t from = recent_.birth[i] > birth ? recent_.birth[i] : birth, to = recent_.death[i] < death ? recent_.death[i] : death;
+        shared[i] = uint8_t(to - from + 1);
+        ruled_out[i] = uint8_t((to < from) | (shared[i] < least) | (recent_.birth[i] == recent_.death[i]) ? 255 : 0);
+    }
+    for (uint32_t i = 0; i < window; ++i) distance[i] = distance_[i] | uint32_t(int32_t(int8_t(ruled_out[i])));
+    return find_near(distance, [&](uint32_t slot, uint32_t d) -> uint32_t {
+        const uint32_t from = recent_.birth[slot] < birth ? recent_.birth[slot] : birth, to = recent_.death[slot] > death ? recent_.death[slot] : death;
+        const uint64_t score = d * uint64_t(life * (to - from + 1)) / (uint32_t(shared[slot]) * shared[slot]);
+        return score < UINT32_MAX ? uint32_t(score) : UINT32_MAX - 1;
+    });
 }
 
 /// Which half of a box its only point is in: where the planes of the nearest points pass.
@@ -140,7 +163,7 @@ void ChunkModel<Coder>::leaf(Box& box, const RawTrack* source) {
         for (int c = 0; c < 3; ++c)
             centre[c] = (2 * int64_t(box.low[c]) + (int64_t(1) << box.bits[c]) - 1) * steps_.ratio / 2;
         measure(centre);
-        const Near near = find_near([](uint32_t) { return true; });
+        const Near near = find_near(distance_, [](uint32_t, uint32_t d) { return d; });
         planes.count = near.count;
         for (uint32_t j = 0; j < near.count; ++j)
             for (int c = 0; c < 3; ++c) {
@@ -301,7 +324,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         t.position[0][c] = t.second[0][c] = t.second[0][c + 3] = 0;
     }
     measure(x);
-    const Near near = find_near([](uint32_t) { return true; });
+    const Near near = find_near(distance_, [](uint32_t, uint32_t d) { return d; });
     life(t, near, source);
     levels_ = axis_levels(steps_, t.death - t.birth + 1u);
     Frame frame = identity_frame;
@@ -319,7 +342,7 @@ bool ChunkModel<Coder>::track(uint32_t index, const Box& box, const RawTrack* so
         along_axis(t, frame, near, source);
     }
     std::memset(rest_, 0, sizeof rest_);
-    const Near moving = find_near([&](uint32_t slot) { return recent_.moves[slot]; });
+    const Near moving = find_moving(t.birth, t.death);
     if (!drops_) coder_.category(bits_motion);
     if (!series(t, frame, false, moving, source)) return false;
     if (!drops_) coder_.category(bits_normals);

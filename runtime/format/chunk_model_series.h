@@ -8,6 +8,9 @@ void ChunkModel<Coder>::carry(const RawTrack& t, const Frame& frame, uint32_t te
     const uint32_t life = t.death - t.birth + 1u;
     terms = at_most(terms, carried_terms);
     const auto* to = polynomials.of(life);
+    int64_t weights = 0;
+    for (uint32_t j = 0; j < moving.count; ++j) weights += carried_share_[j] = 64 + weight_of(moving, j);
+    for (uint32_t j = 0; j < moving.count; ++j) carried_share_[j] = 65536 * carried_share_[j] / weights;
     for (uint32_t j = 0; j < moving.count; ++j) {
         const Track& from = block_.tracks[recent_.track[moving.slot[j]]];
         const auto* at = polynomials.of(from.death - from.birth + 1u);
@@ -45,13 +48,13 @@ typename ChunkModel<Coder>::Said ChunkModel<Coder>::said(const Near& moving, uin
     int64_t sum = 0, least = 0, most = 0;
     for (uint32_t j = 0; j < moving.count && k <= carried_terms; ++j) {
         const int64_t x = carried_[j][k - 1][channel];
-        sum += x;
+        sum += carried_share_[j] * x;
         least = j == 0 || x < least ? x : least;
         most = j == 0 || x > most ? x : most;
     }
     const auto size = [](int64_t x) { return at_most(magnitude_class(at_most(uint32_t((x < 0 ? -x : x) / 64), 1u << 20)), 7); };
     Said out;
-    out.mean = sum * share[moving.count] >> 16;
+    out.mean = sum >> 16;
     out.size = size(out.mean);
     out.spread = moving.count == 0 ? 0 : moving.count == 1 ? 1 + at_most(out.size / 3, 1) : 3 + size(most - least);
     return out;

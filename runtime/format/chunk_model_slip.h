@@ -7,9 +7,8 @@ bool ChunkModel<Coder>::slip(RawTrack& t, const Frame& frame, const RawTrack* so
     t.slip[0] = t.slip[1] = 0;
     if (drops_ || !(steps_.slip_step > 0)) return true;
     coder_.category(bits_slip);
-    const Near near = find_near([&](uint32_t slot) {
-        const Track& other = block_.tracks[recent_.track[slot]];
-        return other.birth <= t.death && t.birth <= other.death;
+    const Near near = find_near(distance_, [&](uint32_t slot, uint32_t d) {
+        return recent_.birth[slot] <= t.death && t.birth <= recent_.death[slot] ? d : UINT32_MAX;
     });
     int64_t mean[3] = {}, weights = 0;
     uint32_t rest = 0, apart = 0;
