@@ -132,7 +132,7 @@ private:
     struct Recent {
         uint32_t count = 0;              ///< slots in use
         int16_t place[3][window];        ///< mean positions, coarse
-        uint8_t birth[window], death[window];
+        uint8_t birth[window] = {}, death[window] = {};
         int32_t mean[window][3];         ///< step/16
         int16_t normal[window][3];       ///< of points, 1/16384
         uint32_t track[window];
@@ -206,7 +206,7 @@ private:
     Recent recent_;
     int64_t search_low_[3];
     uint32_t search_shift_ = 0;
-    uint32_t distance_[window];  ///< of every slot, from measure()
+    uint32_t distance_[window] = {};  ///< of every slot, from measure()
 };
 
 #include "format/chunk_model_parts.h"

@@ -105,7 +105,8 @@ typename ChunkModel<Coder>::Near ChunkModel<Coder>::find_moving(uint8_t birth, u
     for (uint32_t i = 0; i < window; ++i) {
         const uint8_t from = recent_.birth[i] > birth ? recent_.birth[i] : birth, to = recent_.death[i] < death ? recent_.death[i] : death;
         shared[i] = uint8_t(to - from + 1);
-        ruled_out[i] = uint8_t((to < from) | (shared[i] < least) | (recent_.birth[i] == recent_.death[i]) ? 255 : 0);
+        const bool out = (to < from) | (shared[i] < least) | (recent_.birth[i] == recent_.death[i]);
+        ruled_out[i] = out ? 255 : 0;
     }
     for (uint32_t i = 0; i < window; ++i) distance[i] = distance_[i] | uint32_t(int32_t(int8_t(ruled_out[i])));
     return find_near(distance, [&](uint32_t slot, uint32_t d) -> uint32_t {
