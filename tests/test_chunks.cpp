@@ -11,6 +11,7 @@
 #include <random>
 
 #include "basis_tables.h"
+#include "format/chunk_statistics.h"
 #include "format/lattice.h"
 #include "layers_to_chunks.h"
 #include "mesh.h"
@@ -149,6 +150,20 @@ TEST_CASE("a chunk decodes to exactly the quantised tracks") {
         CHECK(d.block.origin[0] == origin.x);
         CHECK(all_numbers(d.block) == expected_numbers(tracks));
     }
+}
+
+TEST_CASE("what nothing was learned of starts at even odds, whatever the compiler makes of constants") {
+    struct {
+        uint32_t unknown = 0, impossible = 0;
+        void operator()(const format::Counter& c) { unknown += c.seen == 0 && c.probability == 32768, impossible += c.probability == 0; }
+        void operator()(const format::Mixer& m) {
+            for (const uint32_t weight : m.weight) impossible += weight == 0;
+        }
+        void operator()(const format::Statistics::Trust& t) { impossible += t.square == 0; }
+    } seen;
+    format::each_part_of(format::first_statistics, [&](const auto& part) { seen(part); });
+    CHECK(seen.unknown > 1000);
+    CHECK(seen.impossible == 0);
 }
 
 TEST_CASE("every life comes back, whatever its ends say of themselves") {

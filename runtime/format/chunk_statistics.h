@@ -80,15 +80,20 @@ public:
         dots_ = count ? count - 1 : 0;
         return unknown;
     }
+    // What is unknown is said as well: GCC 12 makes zeros of what only the members' own initialisers say, deep in a constant's arrays.
     constexpr void operator()(Counter& counter) {
-        if (const int32_t level = next(); level != unknown) counter = {uint16_t(squash(level * 80 - 2040)), seen};
+        const int32_t level = next();
+        counter.probability = uint16_t(level == unknown ? 32768 : squash(level * 80 - 2040)), counter.seen = level == unknown ? 0 : seen;
     }
     constexpr void operator()(Mixer& mixer) {
-        for (uint32_t& weight : mixer.weight)
-            if (const int32_t level = next(); level != unknown) weight = uint32_t(level * 1280 - 20480);
+        for (uint32_t& weight : mixer.weight) {
+            const int32_t level = next();
+            weight = level == unknown ? 20000 : uint32_t(level * 1280 - 20480);
+        }
     }
     constexpr void operator()(Statistics::Trust& trust) {
-        if (const int32_t level = next(); level != unknown) trust.factor = level * 5, trust.product = int64_t(trust.factor) << 10;
+        const int32_t level = next();
+        trust.factor = level == unknown ? 128 : level * 5, trust.product = int64_t(trust.factor) << 10, trust.square = 1 << 18;
     }
 
 private:
