@@ -38,14 +38,18 @@ struct Sums {
         weight += other.weight, distance += other.distance, maximum = std::max(maximum, other.maximum);
         degrees += other.degrees, degrees_weight += other.degrees_weight;
     }
-    /// The distance that 99 % of the area keeps below.
+    /// The distance that 99 % of the area keeps below. Only the farthest are put in order, as many as it takes.
     double p99() {
-        std::sort(samples.begin(), samples.end(),
-                  [](const Sample& a, const Sample& b) { return a.distance < b.distance; });
+        const auto farther = [](const Sample& a, const Sample& b) { return a.distance > b.distance; };
         double above = weight * 0.01;
-        for (size_t i = samples.size(); i-- > 0;)
-            if ((above -= samples[i].weight) < 0) return samples[i].distance;
-        return samples.empty() ? 0 : samples.back().distance;
+        for (size_t first = 0, run = samples.size() / 32 + 1; first < samples.size(); first += run, run *= 2) {
+            const auto begin = samples.begin() + ptrdiff_t(first), end = begin + ptrdiff_t(std::min(run, samples.size() - first));
+            std::nth_element(begin, end - 1, samples.end(), farther);
+            std::sort(begin, end, farther);
+            for (auto sample = begin; sample != end; ++sample)
+                if ((above -= sample->weight) < 0) return sample->distance;
+        }
+        return samples.empty() ? 0 : samples.front().distance;
     }
     DirectedDistance result() {
         return {weight > 0 ? distance / weight : 0, p99(), maximum, degrees_weight > 0 ? degrees / degrees_weight : 0};

@@ -103,29 +103,39 @@ std::vector<Pull> find_pulls(const SurfaceIndex& moved, const Neighbours& neighb
     return pulls;
 }
 
+/// What a vertex is pulled onto: along a unit normal to so much of it, or nowhere if that is zero.
+struct Target {
+    glm::vec3 normal{};
+    float along = 0;
+};
+
 /// One step towards the pulls along their normals, as smooth as `stiffness` asks: Jacobi on
 /// Σ w (n·(u − t))² + stiffness · Σ |u_i − u_j|².
 void relax(std::vector<glm::vec3>& motion, const std::vector<Pull>& pulls, const Neighbours& neighbours, float stiffness, int sweeps,
            int jobs) {
-    const std::vector<glm::vec3> start = motion;
-    std::vector<glm::vec3> next(motion.size());
+    const size_t count = motion.size();
+    std::vector<Target> targets(count);
+    std::vector<glm::vec4> now(count), next(count);  // a fourth component: whole vectors are fetched
+    for_each(count, jobs, [&](size_t i) {
+        now[i] = glm::vec4(motion[i], 0);
+        const float length = glm::length(pulls[i].normal);
+        if (!(pulls[i].weight > 0 && length > 0)) return;
+        const glm::vec3 n = pulls[i].normal / length;
+        targets[i] = {n, glm::dot(n, motion[i] + pulls[i].residual / pulls[i].weight)};
+    });
     for (int sweep = 0; sweep < sweeps; ++sweep) {
-        for_each(motion.size(), jobs, [&](size_t i) {
+        for_each(count, jobs, [&](size_t i) {
             const uint32_t begin = neighbours.first[i], end = neighbours.first[i + 1];
-            if (begin == end) return;
-            glm::vec3 mean(0);
-            for (uint32_t k = begin; k < end; ++k) mean += motion[neighbours.vertex[k]];
-            mean /= float(end - begin);
-            next[i] = mean;
-            const float length = glm::length(pulls[i].normal);
-            if (pulls[i].weight > 0 && length > 0) {
-                const glm::vec3 n = pulls[i].normal / length;
-                const float wanted = glm::dot(n, start[i] + pulls[i].residual / pulls[i].weight) - glm::dot(n, mean);
-                next[i] += n * (wanted / (1 + stiffness));
-            }
+            glm::vec4 mean(0);
+            for (uint32_t k = begin; k < end; ++k) mean += now[neighbours.vertex[k]];
+            mean /= float(std::max(end - begin, 1u));
+            const Target& target = targets[i];
+            const float wanted = target.along - glm::dot(target.normal, glm::vec3(mean));
+            next[i] = mean + glm::vec4(target.normal * (wanted / (1 + stiffness)), 0);
         });
-        std::swap(motion, next);
+        std::swap(now, next);
     }
+    for (size_t i = 0; i < count; ++i) motion[i] = glm::vec3(now[i]);
 }
 
 /// To every value those beside it.
