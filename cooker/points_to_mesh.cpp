@@ -53,14 +53,15 @@ PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) {
     surface::finish_field(field);
 }
 
-Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs) {
+Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs, size_t about) {
     const PointField decoded(points, jobs);
     const uint32_t workers = uint32_t(threads_of(jobs));
     std::vector<uint8_t> memory;
     std::vector<uint32_t> indices;
     Mesh mesh;
     Target target{};
-    for (uint32_t vertices = 1u << 16;; vertices *= 2) {  // until it fits
+    constexpr uint32_t most = 1u << 26;
+    for (uint32_t vertices = uint32_t(std::clamp<size_t>(about + about / 4, 1u << 16, most));; vertices = std::min(2 * vertices, most)) {
         const MeshLimits limits{vertices, 0, 0, workers};
         Mesher* mesher = place_mesher(aligned(memory, mesher_bytes(limits)), limits);
         mesh.positions.resize(vertices), indices.resize(size_t(vertices) * 8);
@@ -71,7 +72,7 @@ Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs) 
         levels.cell_size = cell;
         begin_mesh(mesher, {&decoded.field, levels, nullptr, 0, false, &target});
         run_stages(mesher, workers);
-        if (!mesh_counts(mesher).cut || vertices == 1u << 26) break;
+        if (!mesh_counts(mesher).cut || vertices == most) break;
     }
     mesh.positions.resize(target.vertices_used);
     for (uint32_t i = 0; i + 2 < target.indices_used; i += 3) mesh.triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});

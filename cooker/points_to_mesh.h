@@ -22,6 +22,7 @@ private:
 };
 
 /// The runtime's mesh of the points, with cells of that size (metres): positions and triangles.
-Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs = 1);
+/// `about`: how many vertices to expect, for speed.
+Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs = 1, size_t about = 0);
 
 }  // namespace rill::cooker

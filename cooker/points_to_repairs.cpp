@@ -157,10 +157,12 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
         });
         const auto best = std::min_element(then.begin(), then.end());
         if (now - *best < std::clamp(least_share * now, least_gain, most_gain)) return;
-        now = *best;
-        const auto chosen = place.candidates.begin() + (best - then.begin());
-        around.push_back(*chosen), points.push_back(*chosen);
-        place.candidates.erase(chosen);
+        const size_t chosen = size_t(best - then.begin());
+        around.push_back(place.candidates[chosen]), points.push_back(place.candidates[chosen]);
+        std::vector<SurfacePoint> left;  // who would have mended nothing will not later
+        for (size_t i = 0; i < then.size(); ++i)
+            if (i != chosen && then[i] < now) left.push_back(place.candidates[i]);
+        place.candidates = std::move(left), now = then[chosen];
     }
 }
 
@@ -170,7 +172,7 @@ std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const st
     if (points.empty() || frame.mesh.triangles.empty()) return {};
     std::vector<SurfacePoint> all = points;
     std::vector<Place> seen;
-    for (const OffSurface& off : find_off(frame, mesh_points(points, frame.edge, jobs), beyond, jobs)) {
+    for (const OffSurface& off : find_off(frame, mesh_points(points, frame.edge, jobs, frame.mesh.positions.size()), beyond, jobs)) {
         const auto near = [&](const Place& p) { return glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(seen.begin(), seen.end(), near)) continue;
         if (seen.size() > points.size() / points_per_place) break;

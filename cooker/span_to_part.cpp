@@ -140,7 +140,7 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
     double tolerance = first_tolerance(aim_.p99 / survey_.edge) * aim_.p99, best_miss = HUGE_VAL, ratio_before = 0, tolerance_before = 0;
     for (int attempt = 1;; ++attempt) {
         SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
-        result.measured = verify(candidate, judged, settings_.jobs).totals;
+        result.measured = verify(candidate, judged, settings_.jobs, {}, Scrutiny::glance).totals;
         const double ratio = result.measured.p99() / aim_.p99, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
         if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate, best);
         kept.attempts = attempt;
@@ -165,7 +165,7 @@ SpanResult SpanCook::within_rate(uint32_t span, const std::string& candidate, co
             kept = std::move(result), move_file(candidate, best);
         kept.attempts = ++attempts;
     }
-    kept.measured = verify(best, ChosenFrames(reader_, judged_frames_of(span)), settings_.jobs).totals;
+    kept.measured = verify(best, ChosenFrames(reader_, judged_frames_of(span)), settings_.jobs, {}, Scrutiny::glance).totals;
     return kept;
 }
 

@@ -58,7 +58,7 @@ struct Sums {
 
 /// Per triangle, ¾ of the area at the centroid and 1/12 at each corner: exact for quadratic functions.
 Sums measure(const Mesh& from, const std::vector<glm::vec3>& from_normals, const SurfaceIndex& to,
-             const std::vector<glm::vec3>& to_normals, std::vector<float>* per_vertex) {
+             const std::vector<glm::vec3>& to_normals, size_t stride, std::vector<float>* per_vertex) {
     Sums sums;
     sums.samples.reserve(from.positions.size() + from.triangles.size());
     std::vector<double> weights(from.positions.size(), 0.0);
@@ -71,15 +71,16 @@ Sums measure(const Mesh& from, const std::vector<glm::vec3>& from_normals, const
                                    to_normals[t[2]] * hit.barycentric.z, weight);
         return hit.distance;
     };
-    for (const Triangle& t : from.triangles) {
+    for (size_t i = 0; i < from.triangles.size(); ++i) {
+        const Triangle& t = from.triangles[i];
         const glm::vec3 a = from.positions[t[0]], b = from.positions[t[1]], c = from.positions[t[2]];
         const double area = 0.5 * glm::length(glm::dvec3(glm::cross(b - a, c - a)));
         for (uint32_t v : t) weights[v] += area / 12, used[v] = true;
-        sample((a + b + c) / 3.0f, from_normals[t[0]] + from_normals[t[1]] + from_normals[t[2]], area * 0.75);
+        if (i % stride == 0) sample((a + b + c) / 3.0f, from_normals[t[0]] + from_normals[t[1]] + from_normals[t[2]], area * 0.75);
     }
     if (per_vertex) per_vertex->assign(from.positions.size(), 0.0f);
     for (size_t v = 0; v < weights.size(); ++v) {
-        if (!used[v]) continue;
+        if (!used[v] || v % stride) continue;
         const float distance = sample(from.positions[v], from_normals[v], weights[v]);
         if (per_vertex) (*per_vertex)[v] = distance;
     }
@@ -197,7 +198,7 @@ std::vector<double> component_volumes(const Mesh& mesh) {
 }
 
 SurfaceDistance surface_distance(const Mesh& source, const SurfaceIndex& source_index, const Mesh& decoded,
-                                 const SurfaceIndex& decoded_index, bool keep_per_vertex) {
+                                 const SurfaceIndex& decoded_index, bool keep_per_vertex, size_t stride) {
     SurfaceDistance result;
     if (source.triangles.empty() && decoded.triangles.empty()) return result;
     if (source.triangles.empty() || decoded.triangles.empty()) {
@@ -216,9 +217,10 @@ SurfaceDistance surface_distance(const Mesh& source, const SurfaceIndex& source_
     }
     const std::vector<glm::vec3> source_normals = source.normals.empty() ? vertex_normals(source) : source.normals;
     const std::vector<glm::vec3> decoded_normals = decoded.normals.empty() ? vertex_normals(decoded) : decoded.normals;
-    Sums forward = measure(source, source_normals, decoded_index, decoded_normals,
+    Sums forward = measure(source, source_normals, decoded_index, decoded_normals, stride,
                            keep_per_vertex ? &result.per_source_vertex : nullptr);
-    Sums backward = measure(decoded, decoded_normals, source_index, source_normals, keep_per_vertex ? &result.per_decoded_vertex : nullptr);
+    Sums backward = measure(decoded, decoded_normals, source_index, source_normals, stride,
+                            keep_per_vertex ? &result.per_decoded_vertex : nullptr);
     result.forward = forward.result(), result.backward = backward.result();
     forward.add(backward);
     for (const Sample& sample : forward.samples) result.histogram.add(sample.distance, sample.weight);

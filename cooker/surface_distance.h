@@ -82,9 +82,9 @@ private:
     double p99_ = 0;
 };
 /// Samples: every vertex and every triangle centroid of each side, weighted by the area it stands for.
-/// Both empty: all zero. One empty: distances are +inf.
+/// Both empty: all zero. One empty: distances are +inf. `stride`: only every so many of them, for an estimate.
 SurfaceDistance surface_distance(const Mesh& source, const SurfaceIndex& source_index,
                                  const Mesh& decoded, const SurfaceIndex& decoded_index,
-                                 bool keep_per_vertex = false);
+                                 bool keep_per_vertex = false, size_t stride = 1);
 
 }  // namespace rill::cooker

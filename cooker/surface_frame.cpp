@@ -90,7 +90,6 @@ void VertexTree::within(const glm::vec3& x, float radius, std::vector<Found>& ou
     parameters.sorted = false;
     impl_->tree.radiusSearch(&x.x, radius * radius, found, parameters);
     for (const auto& [vertex, distance2] : found) out.push_back({vertex, distance2});
-    std::sort(out.begin(), out.end(), [](const Found& a, const Found& b) { return a.vertex < b.vertex; });
 }
 
 SurfaceFrame::SurfaceFrame(Mesh source, float edge_length, std::vector<Drop> pieces)

@@ -34,7 +34,7 @@ public:
     };
     /// Up to `count` nearest, ascending by distance (ties by index).
     void nearest(const glm::vec3& x, size_t count, std::vector<Found>& out) const;
-    /// All within `radius`, ascending by vertex index.
+    /// All within `radius`, in the tree's order: the same of the same points.
     void within(const glm::vec3& x, float radius, std::vector<Found>& out) const;
 private:
     struct Impl;

@@ -88,7 +88,7 @@ Residual measure_residual(const SurfaceFrame& frame, const std::vector<SurfacePo
 
 void mark_spurs(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, Residual& residual, int jobs) {
     if (frame.mesh.triangles.empty()) return;
-    const Mesh decoded = mesh_points(points, frame.edge, jobs);
+    const Mesh decoded = mesh_points(points, frame.edge, jobs, frame.mesh.positions.size());
     const std::vector<uint32_t> spurs = find_beyond(frame.index, decoded.positions, beyond, jobs);
     std::vector<uint32_t> nearest(spurs.size());
     parallel_for(spurs.size(), jobs, [&](size_t i) {

@@ -39,10 +39,10 @@ double area_of(const Mesh& mesh) {
     return area;
 }
 
-FrameMeasure measure_plainly(const Mesh& source, AssetPlayer& player, double seconds, double cell) {
+FrameMeasure measure_plainly(const Mesh& source, AssetPlayer& player, double seconds, double cell, size_t stride) {
     const Mesh decoded = player.mesh(seconds);
     FrameMeasure frame = measure(source, decoded, cell);
-    frame.distance = surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded));
+    frame.distance = surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded), false, stride);
     return frame;
 }
 
@@ -131,7 +131,7 @@ std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const s
 }
 
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
-                    const std::function<void(uint32_t, uint32_t)>& progress, bool details) {
+                    const std::function<void(uint32_t, uint32_t)>& progress, Scrutiny scrutiny) {
     const AssetDirectory directory = read_directory(asset);
     const std::vector<int>& numbers = source.info().numbers;
     std::vector<uint32_t> index;
@@ -141,7 +141,8 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     result.diagonal = directory.diagonal();
     result.edge = directory.header.cell_size;
     result.bytes_per_frame = double(directory.header.file_bytes) / directory.header.frame_count;
-    result.details = details;
+    const bool details = result.details = scrutiny == Scrutiny::close;
+    const size_t stride = scrutiny == Scrutiny::glance ? 3 : 1;
     read_target(result, directory.settings_json);
     const SourceVelocity velocity = details ? velocity_of(source) : SourceVelocity{};
     // A run of neighbouring frames per task, one player each: its windows are decoded about once.
@@ -155,7 +156,7 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
         for (size_t i = part * run; i < std::min((part + 1) * run, numbers.size()); ++i) {
             const double seconds = player.frame_seconds(index[i]);
             FrameMeasure frame = details ? measure_closely(velocity.known ? source.read(i) : source.read_surface(i), velocity, player, seconds, result.edge)
-                                         : measure_plainly(source.read_surface(i), player, seconds, result.edge);
+                                         : measure_plainly(source.read_surface(i), player, seconds, result.edge, stride);
             frame.number = numbers[i], frame.seconds = seconds;
             const std::lock_guard lock(mutex);
             frames.put(i, std::move(frame));

@@ -80,14 +80,18 @@ struct Verification {
     bool target_met() const { return target_p99 == 0 || p99 <= target_p99 * target_slack; }
     static constexpr double target_slack = 1.1;
 };
+enum class Scrutiny {
+    glance,  ///< a third of the samples, in half the time: mean and p99 within a percent, the maximum not
+    plain,
+    close,   ///< velocity, thin liquid and coarser cells too
+};
 /// The frames of `asset` (or of `read`'s range, if it has one) out of `input`, read as they were when it was cooked
 /// unless `read` says otherwise. Throws InputError when either
 /// cannot be read or the input lacks one.
 std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read);
 /// Every frame of the source against the asset. Throws InputError when the asset lacks one. jobs 0: all cores.
-/// `details`: velocity, thin liquid and coarser cells too.
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
-                    const std::function<void(uint32_t done, uint32_t total)>& progress = {}, bool details = false);
+                    const std::function<void(uint32_t done, uint32_t total)>& progress = {}, Scrutiny scrutiny = Scrutiny::plain);
 
 /// Documented in cooker/REPORTS.md.
 nlohmann::json to_json(const Verification& verification);

@@ -95,7 +95,7 @@ int verify_command(const VerifyOptions& options) {
     Verification result;
     {
         Progress progress("verify", options.quiet);
-        result = verify(options.asset, *source, options.jobs, [&](uint32_t done, uint32_t total) { progress("", done, total); }, true);
+        result = verify(options.asset, *source, options.jobs, [&](uint32_t done, uint32_t total) { progress("", done, total); }, Scrutiny::close);
         if (options.substeps > 0)
             result.motion = measure_motion(options.asset, result.frames.front().number, result.frames.back().number, options.substeps, options.jobs,
                                            [&](uint32_t done, uint32_t total) { progress("motion", done, total); });
