@@ -170,17 +170,17 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
 
 std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs) {
     if (points.empty() || frame.mesh.triangles.empty()) return {};
-    std::vector<SurfacePoint> all = points;
-    std::vector<Place> seen;
+    std::vector<Place> places;
     for (const OffSurface& off : find_off(frame, mesh_points(points, frame.edge, jobs, frame.mesh.positions.size()), beyond, jobs)) {
         const auto near = [&](const Place& p) { return glm::distance(p.centre, off.position) < cleared * p.radius; };
-        if (std::any_of(seen.begin(), seen.end(), near)) continue;
-        if (seen.size() > points.size() / points_per_place) break;
-        Place& place = seen.emplace_back();
+        if (std::any_of(places.begin(), places.end(), near)) continue;
+        if (places.size() > points.size() / points_per_place) break;
+        Place& place = places.emplace_back();
         place.centre = off.position, place.radius = std::max(least_radius * frame.edge, off.distance + around_void * frame.edge);
-        find_probes(frame, place), find_candidates(frame, place);
-        repair(frame, place, all, jobs);
     }
+    parallel_for(places.size(), jobs, [&](size_t i) { find_probes(frame, places[i]), find_candidates(frame, places[i]); });
+    std::vector<SurfacePoint> all = points;
+    for (Place& place : places) repair(frame, place, all, jobs);
     std::vector<Path> born;
     for (size_t i = points.size(); i < all.size(); ++i) born.push_back(Path::born(all[i], point_radius * frame.edge, sample));
     return born;

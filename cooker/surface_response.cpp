@@ -80,12 +80,12 @@ void SurfaceResponse::find_shares(const SurfaceFrame& frame, const std::vector<S
     std::vector<float> weight(field.point_count);
     const auto normal_of = [](const surface::Patch& p) { return glm::vec3(p.nx, p.ny, p.nz); };
     const auto add_vertex = [&](uint32_t v, uint32_t count) {
-        const glm::vec3& x = frame.mesh.positions[v];
+        const glm::vec3& place = frame.mesh.positions[v];
         float nearest = INFINITY, sum = 0;
         glm::vec3 facing(0);
         for (uint32_t c = 0; c < count; ++c) {
             const surface::Patch& patch = field.patches[candidates[c]];
-            const glm::vec3 r = x - glm::vec3(patch.x, patch.y, patch.z);
+            const glm::vec3 r = place - glm::vec3(patch.x, patch.y, patch.z);
             const float h = glm::dot(normal_of(patch), r), d2 = glm::dot(r, r);
             const float u2 = (d2 + surface::flatten * h * h) * patch.inverse, left = std::max(1 - u2, 0.f);
             weight[c] = left * left * left / (u2 + surface::soften);
@@ -100,9 +100,9 @@ void SurfaceResponse::find_shares(const SurfaceFrame& frame, const std::vector<S
         for (uint32_t c = 0; c < count; ++c) {
             if (!(weight[c] > least_share * sum)) continue;
             const uint32_t i = field.source[candidates[c]];
-            const glm::vec3 r = x - points[i].position;
-            const float share = weight[c] / sum;
-            shares.push_back({i, {v, share, share * glm::dot(r, tangents[i].t1), share * glm::dot(r, tangents[i].t2)}});
+            const glm::vec3 r = place - points[i].position;
+            const float share = weight[c] / sum, x = glm::dot(r, tangents[i].t1), y = glm::dot(r, tangents[i].t2);
+            shares.push_back({i, {v, share, share * x, share * y, share * glm::vec3(x * x, x * y, y * y)}});
         }
     };
     for (const VertexGroup& group : frame.groups) {
@@ -167,11 +167,10 @@ void SurfaceResponse::of(uint32_t point, std::vector<Response>& out, std::vector
         const Bend& bend = bends_.row[b];
         for (uint32_t k = shares_.first[bend.patch]; k < shares_.first[bend.patch + 1]; ++k) {
             const Share& s = shares_.row[k];
-            const glm::vec3 monomials = glm::vec3(s.x * s.x, s.x * s.y, s.y * s.y) / s.share;
             glm::vec3& by = slot(s.vertex);
-            by.x += glm::dot(monomials, bend.by);
+            by.x += glm::dot(s.monomials, bend.by);
             if (bend.patch != point) continue;
-            by.y += glm::dot(monomials, twists_[point][0]), by.z += glm::dot(monomials, twists_[point][1]);
+            by.y += glm::dot(s.monomials, twists_[point][0]), by.z += glm::dot(s.monomials, twists_[point][1]);
         }
     }
     for (const Response& r : out) slots[r.vertex] = none;

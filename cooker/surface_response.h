@@ -32,10 +32,11 @@ public:
     Grip grip_of(uint32_t point) const;
 
 private:
-    /// A patch's share in the surface at a vertex, and the share times where the vertex is on its tangents.
+    /// A patch's share in the surface at a vertex, and that times where the vertex is on its tangents, x and y, and times xx, xy and yy.
     struct Share {
         uint32_t vertex;
         float share, x, y;
+        glm::vec3 monomials;
     };
     /// What a point does to the quadratic of a patch (xx, xy, yy), per metre along the point's normal.
     struct Bend {
