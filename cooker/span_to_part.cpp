@@ -10,6 +10,7 @@
 #include "frames_to_tracks.h"
 #include "parallel.h"
 #include "rate_search.h"
+#include "split_edges.h"
 #include "surface_motion.h"
 #include "window_to_chunks.h"
 
@@ -26,11 +27,18 @@ constexpr double least_hopeless = 1.4;       // times the target: where less is 
 constexpr double most_miss = 0.3;            // edges, of such liquid from the surface: velocities that carry nothing have more
 constexpr double calm_tolerance = 1.1;       // of such liquid: at the same tolerance its error is a tenth below that of other liquid
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
+constexpr float longest_edge = 2.5f;         // times the median
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
 /// Of the error aimed at: what an attempt begins with. Three splashes take about 1.48 at a quarter of an edge; the finer, the
 /// more of the error is not the points'.
-double first_tolerance(double edges) { return 1.48 * std::pow(edges / 0.25, 0.2); }
+double first_tolerance(double edges) { return 1.48 * std::pow(edges / 0.25, edges < 0.25 ? 0.4 : 0.2); }
+/// Of the tolerance: the next attempt's, from how the last two errors, relative to the one aimed at, went with theirs.
+double next_tolerance(double ratio, double tolerance, double ratio_before, double tolerance_before) {
+    const double by = std::log(tolerance / tolerance_before), did = std::log(ratio / ratio_before);
+    const double power = ratio_before > 0 && by * did > 0 ? std::clamp(by / did, 0.7, 2.0) : 0.9;
+    return std::clamp(std::pow(1 / ratio, power), 0.3, 2.0);
+}
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
@@ -148,8 +156,9 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
         if (near || attempt == most_attempts) return kept;
         if (attempt > 1 && ratio > least_hopeless && tolerance < tolerance_before &&
             std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
-        ratio_before = ratio, tolerance_before = tolerance;
-        tolerance *= std::clamp(std::pow(1 / ratio, 0.9), 0.3, 2.0);
+        const double next = tolerance * next_tolerance(ratio, tolerance, ratio_before, tolerance_before);
+        if (getenv("RT")) fprintf(stderr,"attempt %d tol %g ratio %g bytes\n",attempt,tolerance/aim_.p99,ratio);
+        ratio_before = ratio, tolerance_before = tolerance, tolerance = next;
     }
 }
 SpanResult SpanCook::within_rate(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
@@ -223,6 +232,7 @@ void SpanCook::load(Window& window, uint32_t last, const Past& past, float toler
         }
         Mesh mesh = reader_.read(size_t(window.first) + s);
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
+        split_long_edges(mesh, longest_edge * survey_.edge);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });
 }

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdint>
 
+#include "format/bits.h"
 #include "format/carried_motion.h"
 #include "format/chunk_statistics.h"
 #include "format/entropy_decoder.h"
@@ -22,12 +23,7 @@ namespace rill::format {
 enum BitCategory : int { bits_structure, bits_births, bits_motion, bits_normals, bits_drops, bits_first, bits_slip, bit_categories };
 
 /// Magnitude class: 0, 1, 2, 3–4, 5–8, 9–16 …
-inline uint32_t magnitude_class(uint32_t m) {
-    if (m <= 2) return m;
-    uint32_t c = 2;
-    for (m = (m - 1) >> 1; m > 0; m >>= 1) ++c;
-    return c;
-}
+inline uint32_t magnitude_class(uint32_t m) { return m <= 2 ? m : 2 + bit_width((m - 1) >> 1); }
 inline uint32_t at_most(uint32_t value, uint32_t limit) { return value < limit ? value : limit; }
 inline uint32_t magnitude(int32_t v) { return v < 0 ? 0u - uint32_t(v) : uint32_t(v); }
 inline int64_t rounded_division(int64_t a, int64_t b) {

@@ -61,12 +61,13 @@ typename ChunkModel<Coder>::Said ChunkModel<Coder>::said(const Near& moving, uin
 }
 
 /// Sixteen levels of an expected magnitude in 1/16, finer than magnitude_class().
-inline uint32_t residual_level(uint32_t expected) {
+inline constexpr auto residual_levels = [] {
     constexpr uint32_t above[15] = {0, 2, 4, 7, 10, 14, 20, 28, 40, 56, 80, 120, 190, 320, 640};
-    uint32_t level = 0;
-    while (level < 15 && expected > above[level]) ++level;
-    return level;
-}
+    std::array<uint8_t, above[14] + 2> levels{};
+    for (uint32_t expected = 1; expected < levels.size(); ++expected) levels[expected] = uint8_t(levels[expected - 1] + (expected - 1 == above[levels[expected - 1]]));
+    return levels;
+}();
+inline uint32_t residual_level(uint32_t expected) { return residual_levels[at_most(expected, uint32_t(residual_levels.size() - 1))]; }
 
 /// Contexts of a channel's residual. `others`: magnitudes of this term's channels so far.
 template <class Coder>

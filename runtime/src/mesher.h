@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "cell_patches.h"
-#include "surface/bits.h"
+#include "format/bits.h"
 #include "surface/field_to_mesh.h"
 
 namespace rill {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "surface/bits.h"
+#include "format/bits.h"
 #include "surface/field.h"
 #include "surface/field_kernels.h"
 #include "surface/field_rules.h"

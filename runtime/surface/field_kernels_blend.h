@@ -3,7 +3,7 @@
 #pragma once
 #include <cmath>
 
-#include "surface/bits.h"
+#include "format/bits.h"
 #include "surface/field.h"
 #include "surface/field_kernels_search.h"
 #include "surface/field_rules.h"

@@ -2,7 +2,7 @@
 // Through the bundles: which points reach a box, which lie near some of them, and the winding number of all. Sixteen are
 // asked at a time, from groups to bundles to points.
 #pragma once
-#include "surface/bits.h"
+#include "format/bits.h"
 #include "surface/field.h"
 #include "surface/field_kernels_lanes.h"
 #include "surface/field_rules.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Walking the bits of a word.
+// The bits of a word.
 #pragma once
 #include <cstdint>
 
@@ -12,6 +12,16 @@ inline uint32_t lowest_bit(uint32_t bits) {
 #else
     uint32_t n = 0;
     for (; !(bits & 1); bits >>= 1) ++n;
+    return n;
+#endif
+}
+/// How many bits it takes to write the number; 0 for 0.
+inline uint32_t bit_width(uint32_t number) {
+#if defined(__GNUC__)
+    return number ? 32 - uint32_t(__builtin_clz(number)) : 0;
+#else
+    uint32_t n = 0;
+    for (; number; number >>= 1) ++n;
     return n;
 #endif
 }
