@@ -40,35 +40,22 @@ struct Box {
     void add(const glm::vec3& x) { add(Box{x, x}); }
 };
 
-/// Closest point to the origin of a triangle as barycentric coordinates (Ericson, Real-Time Collision
-/// Detection 5.1.5), falling back to a corner where a degenerate triangle has no interior.
+/// Closest point to the origin of a triangle as barycentric coordinates: the nearest on its edges or, if that is nearer yet, inside.
+/// (Deciding by signs which of them it is, as Ericson, Real-Time Collision Detection 5.1.5, goes wrong on slivers.)
 glm::vec3 closest_barycentric(const Corners& t) {
-    const glm::vec3 ab = t.b - t.a, ac = t.c - t.a;
-    const float d1 = -glm::dot(ab, t.a), d2 = -glm::dot(ac, t.a);
-    if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-    const float d3 = -glm::dot(ab, t.b), d4 = -glm::dot(ac, t.b);
-    if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-    const float vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) {
-        const float v = d1 / (d1 - d3);
-        return {1 - v, v, 0};
-    }
-    const float d5 = -glm::dot(ab, t.c), d6 = -glm::dot(ac, t.c);
-    if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-    const float vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0 && d2 > d6) {
-        const float w = d2 / (d2 - d6);
-        return {1 - w, 0, w};
-    }
-    const float va = d3 * d6 - d5 * d4;
-    const float along = d4 - d3, back = d5 - d6;
-    if (va <= 0 && along >= 0 && back >= 0 && along + back > 0) {
-        const float w = along / (along + back);
-        return {0, 1 - w, w};
-    }
-    const float sum = va + vb + vc;
-    if (!(sum > 0)) return {1, 0, 0};
-    return {va / sum, vb / sum, vc / sum};
+    const glm::vec3 b = t.b - t.a, c = t.c - t.a;
+    const float bb = glm::dot(b, b), bc = glm::dot(b, c), cc = glm::dot(c, c), ab = -glm::dot(t.a, b), ac = -glm::dot(t.a, c);
+    const auto along = [](float dot, float length2) { return std::clamp(dot / std::max(length2, FLT_MIN), 0.f, 1.f); };
+    float best = std::numeric_limits<float>::infinity(), v = 0, w = 0;
+    const auto offer = [&](float to_b, float to_c) {
+        const glm::vec3 x = t.a + to_b * b + to_c * c;
+        if (const float distance2 = glm::dot(x, x); distance2 < best) best = distance2, v = to_b, w = to_c;
+    };
+    const float across = along(cc - bc + ab - ac, bb - 2 * bc + cc);
+    offer(along(ab, bb), 0), offer(0, along(ac, cc)), offer(across, 1 - across);
+    const float all = bb * cc - bc * bc, p = cc * ab - bc * ac, q = bb * ac - bc * ab;
+    if (p >= 0 && q >= 0 && p + q <= all) offer(p / std::max(all, FLT_MIN), q / std::max(all, FLT_MIN));
+    return {1 - v - w, v, w};
 }
 
 Lanes lesser(Lanes a, Lanes b) { return a < b ? a : b; }

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+// Sources of uneven triangles, as adaptive meshers and decimation write them.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "asset_player.h"
+#include "cook.h"
+#include "sequence_files.h"
+#include "shapes.h"
+#include "split_edges.h"
+#include "surface_distance.h"
+
+using namespace rill::cooker;
+
+namespace {
+
+/// A pool of 1 × 0.5 × 0.4 m: waves of small triangles above, two large ones below, and fans of long ones for walls.
+Mesh pool(double seconds) {
+    constexpr uint32_t nx = 20, ny = 10;
+    Mesh mesh;
+    const auto put = [&](float x, float y, float z, float up) {
+        mesh.positions.push_back({x, y, z}), mesh.velocities.push_back({0, 0, up});
+    };
+    for (uint32_t j = 0; j <= ny; ++j)
+        for (uint32_t i = 0; i <= nx; ++i) {
+            const float x = float(i) / nx, y = 0.5f * float(j) / ny, phase = 5 * x + 3 * y - 4 * float(seconds);
+            const float high = i % nx && j % ny ? 0.05f : 0;  // none at the rim: the walls are flat
+            put(x, y, 0.4f + high * std::sin(phase), -4 * high * std::cos(phase));
+        }
+    const auto at = [](uint32_t i, uint32_t j) { return j * (nx + 1) + i; };
+    for (uint32_t j = 0; j < ny; ++j)
+        for (uint32_t i = 0; i < nx; ++i) {
+            mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+            mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+        }
+    const uint32_t floor = uint32_t(mesh.positions.size());
+    put(0, 0, 0, 0), put(1, 0, 0, 0), put(1, 0.5f, 0, 0), put(0, 0.5f, 0, 0);
+    mesh.triangles.push_back({floor, floor + 2, floor + 1}), mesh.triangles.push_back({floor, floor + 3, floor + 2});
+    const auto wall = [&](uint32_t steps, uint32_t from, uint32_t to, const auto& rim) {  // left to right, seen from outside
+        for (uint32_t i = 0; i < steps; ++i) mesh.triangles.push_back({from, rim(i + 1), rim(i)});
+        mesh.triangles.push_back({from, to, rim(steps)});
+    };
+    wall(nx, floor, floor + 1, [&](uint32_t i) { return at(i, 0); });
+    wall(ny, floor + 1, floor + 2, [&](uint32_t j) { return at(nx, j); });
+    wall(nx, floor + 2, floor + 3, [&](uint32_t i) { return at(nx - i, ny); });
+    wall(ny, floor + 3, floor, [&](uint32_t j) { return at(0, ny - j); });
+    return mesh;
+}
+
+float longest_edge_of(const Mesh& mesh) {
+    float longest = 0;
+    for (const Triangle& t : mesh.triangles)
+        for (size_t k = 0; k < 3; ++k) longest = std::max(longest, glm::distance(mesh.positions[t[k]], mesh.positions[t[(k + 1) % 3]]));
+    return longest;
+}
+SurfaceDistance between(const Mesh& a, const Mesh& b) { return surface_distance(a, SurfaceIndex(a), b, SurfaceIndex(b)); }
+
+}  // namespace
+
+TEST_CASE("no edge is longer than asked for, and the surface is the same one, closed") {
+    const Mesh whole = pool(0);
+    REQUIRE(topology(whole).open_edges == 0);
+    REQUIRE(signed_volume(whole) > 0);
+    for (const float longest : {1.f, 0.3f, 0.1f, 0.04f}) {
+        CAPTURE(longest);
+        Mesh mesh = whole;
+        split_long_edges(mesh, longest);
+        CHECK(longest_edge_of(mesh) <= longest);
+        const Topology shape = topology(mesh);
+        CHECK(shape.open_edges == 0);
+        CHECK(shape.non_manifold_edges == 0);
+        CHECK(shape.components == 1);
+        CHECK(shape.volume == doctest::Approx(signed_volume(whole)).epsilon(1e-5));
+        CHECK(between(whole, mesh).max < 1e-3);
+        CHECK(mesh.velocities.size() == mesh.positions.size());
+        CHECK(mesh.triangles.size() < 40 * 2.2 / (longest * longest) + 2 * double(whole.triangles.size()));  // of 2.2 m²
+    }
+}
+
+TEST_CASE("velocities are interpolated, normals are left to be found anew") {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {8, 0, 0}, {0, 1, 0}};
+    mesh.velocities = {{0, 0, 1}, {8, 0, 1}, {0, 2, 1}};
+    mesh.normals.assign(3, {0, 0, 1});
+    mesh.triangles = {{0, 1, 2}};
+    split_long_edges(mesh, 0.7f);
+    REQUIRE(mesh.positions.size() > 20);
+    CHECK(mesh.normals.empty());
+    for (size_t i = 0; i < mesh.positions.size(); ++i)
+        CHECK(glm::distance(mesh.velocities[i], glm::vec3(mesh.positions[i].x, 2 * mesh.positions[i].y, 1)) < 1e-5f);
+}
+
+TEST_CASE("a mesh of short edges is left as it is, to the bit") {
+    const Mesh before = sphere(24, 1);
+    Mesh mesh = before;
+    split_long_edges(mesh, longest_edge_of(before));
+    CHECK(mesh.positions == before.positions);
+    CHECK(mesh.triangles == before.triangles);
+}
+
+TEST_CASE("a frame of much area is not split without end") {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    split_long_edges(mesh, 1e-6f);
+    CHECK(mesh.triangles.size() > 500'000);
+    CHECK(mesh.triangles.size() < 9'000'000);
+}
+
+TEST_CASE("liquid with a floor of two triangles comes out whole") {
+    const TestFolder folder;
+    constexpr int frames = 4;
+    for (int i = 0; i < frames; ++i) put_file(folder / "in" + "/f" + std::to_string(1 + i) + ".ply", plain_ply(pool(i / 24.)));
+    CookSettings settings;
+    settings.jobs = 2;
+    cook(folder / "in", folder / "out.rill", settings, [](const CookProgress&) {});
+    AssetPlayer player(folder / "out.rill");
+    for (uint32_t i = 0; i < frames; ++i) {
+        CAPTURE(i);
+        const Mesh source = pool(i / 24.), decoded = player.mesh(player.frame_seconds(i));
+        CHECK(signed_volume(decoded) == doctest::Approx(signed_volume(source)).epsilon(0.01));
+        Mesh even = source;  // samples everywhere
+        split_long_edges(even, 0.05f);
+        const SurfaceDistance d = between(even, decoded);
+        CHECK(d.histogram.quantile(0.9) < 0.25 * median_edge(source));  // a tenth lies along sharp rims
+        CHECK(d.max < 2 * median_edge(source));
+    }
+}
