@@ -5,6 +5,8 @@
 #include <cmath>
 #include <mutex>
 
+#include "weld_seams.h"
+
 namespace rill::cooker {
 namespace {
 
@@ -143,6 +145,8 @@ void check_frame(Mesh& mesh, const std::string& name, const std::function<void(c
                 throw InputError(name + ": triangle " + std::to_string(i) + " refers to vertex " + std::to_string(v) +
                                  " of " + std::to_string(vertices));
     std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+    if (const size_t closed = weld_seams(mesh); closed > 0 && warn)
+        warn(name + " (" + std::to_string(closed) + " edges): vertices at the same place are taken as one");
     if (signed_volume(mesh) < 0) {
         for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
         for (glm::vec3& n : mesh.normals) n = -n;

@@ -68,7 +68,7 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         const size_t i = full[full.size() * k / looks];
         if (shapes[k].open_edges == 0) continue;
         std::snprintf(text, sizeof text, ": the mesh is open (%u open edges): the decoded surface is closed, so holes are covered; "
-                      "export the whole liquid, with seams welded and the sides of the domain capped", shapes[k].open_edges);
+                      "export the whole liquid, with the sides of the domain capped", shapes[k].open_edges);
         warn(reader.name(i) + text);
         break;
     }

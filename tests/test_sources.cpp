@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sources of uneven triangles, as adaptive meshers and decimation write them.
+// Sources that are not as a fluid mesher makes them: uneven triangles, a vertex per corner.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
@@ -12,6 +12,7 @@
 #include "shapes.h"
 #include "split_edges.h"
 #include "surface_distance.h"
+#include "weld_seams.h"
 
 using namespace rill::cooker;
 
@@ -108,6 +109,42 @@ TEST_CASE("a frame of much area is not split without end") {
     split_long_edges(mesh, 1e-6f);
     CHECK(mesh.triangles.size() > 500'000);
     CHECK(mesh.triangles.size() < 9'000'000);
+}
+
+TEST_CASE("a vertex per corner becomes a vertex per place, with the mean of the velocities") {
+    const Mesh whole = pool(0);
+    Mesh soup;
+    for (const Triangle& t : whole.triangles) {
+        const uint32_t first = uint32_t(soup.positions.size());
+        for (const uint32_t v : t) soup.positions.push_back(whole.positions[v]), soup.velocities.push_back(whole.velocities[v]);
+        soup.velocities.back() += glm::vec3(0, 0, 0.01f);
+        soup.triangles.push_back({first, first + 1, first + 2});
+    }
+    CHECK(weld_seams(soup) == 3 * whole.triangles.size());
+    CHECK(soup.positions.size() == whole.positions.size());
+    CHECK(soup.triangles.size() == whole.triangles.size());
+    CHECK(topology(soup).open_edges == 0);
+    CHECK(signed_volume(soup) == doctest::Approx(signed_volume(whole)));
+    for (size_t i = 0; i < soup.positions.size(); ++i) {
+        const auto at = std::find(whole.positions.begin(), whole.positions.end(), soup.positions[i]) - whole.positions.begin();
+        const float off = soup.velocities[i].z - whole.velocities[size_t(at)].z;
+        CHECK(off >= 0);
+        CHECK(off <= 0.0101f);
+    }
+}
+
+TEST_CASE("what touches at a vertex stays apart, and a hole stays one") {
+    Mesh two = sphere(16, 1), other = two;
+    for (glm::vec3& x : other.positions) x.z -= 2;
+    other.positions[0] = two.positions.back();  // pole to pole
+    append(two, other);
+    const Mesh before = two;
+    CHECK(weld_seams(two) == 0);
+    CHECK(two.positions == before.positions);
+    CHECK(two.triangles == before.triangles);
+    two.triangles.erase(two.triangles.begin() + ptrdiff_t(two.triangles.size() / 4));  // open edges that no weld closes
+    CHECK(weld_seams(two) == 0);
+    CHECK(two.positions == before.positions);
 }
 
 TEST_CASE("liquid with a floor of two triangles comes out whole") {
