@@ -22,7 +22,7 @@ constexpr float near_by = 24;             // from a place on points count for le
 constexpr float least_near = 6;           // from nearer on where `enough_near` are,
 constexpr float wide = 4;                 // but all of them where it is that wide: their winding number decides there
 // Radii of a place.
-constexpr float probe_spacing = 0.2f;
+constexpr float probe_spacing = 0.25f;    // .2: twice as many probes, bytes at equal p99 +.1 to +1.2 %
 constexpr float most_depth = 0.8f;        // of a probe
 constexpr float candidates_apart = 0.32f; // unless they face apart
 constexpr float cleared = 0.8f;           // places begin no nearer to an earlier one
@@ -119,7 +119,7 @@ std::vector<SurfacePoint> points_around(const SurfaceFrame& frame, const std::ve
     std::vector<SurfacePoint> around;
     for (size_t i = 0; i < points.size(); ++i) {
         const float away = glm::distance(points[i].position, x) / near;
-        const uint32_t stride = away < 1 ? 1 : 1u << std::min(20, 2 * (std::ilogb(away) + 1));
+        const uint32_t stride = away < 1 ? 1 : 1u << std::min(20, 3 * (std::ilogb(away) + 1));  // as many at any distance: by 2; the same figures
         if (uint32_t(i * 2654435761u) >> 12 & (stride - 1)) continue;
         around.push_back(points[i]);
     }

@@ -78,15 +78,13 @@ std::vector<Pull> find_pulls(const SurfaceIndex& moved, const Neighbours& neighb
                              const std::vector<glm::vec3>& to_normals, float reach, size_t stride, int jobs) {
     constexpr float alike = 0.3f;  // cosine: across a sheet the other side faces away
     const std::vector<glm::vec3>&here = moved.mesh().positions, &there = to.mesh().positions;
-    std::vector<glm::vec3> normals(here.size());
     std::vector<Pull> pulls(here.size());
-    for_each(here.size(), jobs, [&](size_t i) {
-        normals[i] = neighbours.normal(here, i);
-        if (i % stride) return;
+    for_each((here.size() + stride - 1) / stride, jobs, [&](size_t k) {
+        const size_t i = k * stride;
         const SurfaceIndex::Hit hit = to.closest(here[i], reach);
         if (!(hit.distance < reach)) return;
         const glm::vec3 n = at(hit, to.mesh().triangles[hit.triangle], to_normals);
-        if (glm::dot(n, normals[i]) > alike) pulls[i].add(hit.point - here[i], n, 1);
+        if (glm::dot(n, neighbours.normal(here, i)) > alike) pulls[i].add(hit.point - here[i], n, 1);
     });
     // What the next surface has and nothing of this one goes to: crowns and fingers as they shoot out.
     std::vector<SurfaceIndex::Hit> hits((there.size() + stride - 1) / stride);
@@ -96,7 +94,8 @@ std::vector<Pull> find_pulls(const SurfaceIndex& moved, const Neighbours& neighb
         const size_t i = k * stride;
         if (!(hit.distance < reach)) continue;
         const Triangle& t = moved.mesh().triangles[hit.triangle];
-        if (glm::dot(at(hit, t, normals), to_normals[i]) <= alike) continue;
+        const glm::vec3 facing = unit_normal(glm::cross(here[t[1]] - here[t[0]], here[t[2]] - here[t[0]]));
+        if (glm::dot(facing, to_normals[i]) <= alike) continue;
         for (int c = 0; c < 3; ++c)
             if (hit.barycentric[c] > 0) pulls[t[size_t(c)]].add(there[i] - hit.point, to_normals[i], hit.barycentric[c]);
     }
