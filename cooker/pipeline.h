@@ -2,6 +2,7 @@
 // All stages of the cook, top to bottom, with what passes between them. One window at a time:
 //
 //   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids
+//   split_edges            long edges are halved: all that follows is measured and held at vertices
 //   frames_to_samples      where the surface decoded so far is wrong, new points are born
 //   surface_motion         how each surface moves onto the next
 //   samples_to_tracks      points are carried through the window's frames by that motion, held to the surface

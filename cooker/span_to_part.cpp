@@ -33,7 +33,7 @@ constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a sear
 /// Of the error aimed at: what an attempt begins with. Three splashes take about 1.48 at a quarter of an edge; the finer, the
 /// more of the error is not the points'.
 double first_tolerance(double edges) { return 1.48 * std::pow(edges / 0.25, edges < 0.25 ? 0.4 : 0.2); }
-/// Of the tolerance: the next attempt's, from how the last two errors, relative to the one aimed at, went with theirs.
+/// The next attempt's, in the last one's: from how the last two errors, in the one aimed at, went with their tolerances (0: none before).
 double next_tolerance(double ratio, double tolerance, double ratio_before, double tolerance_before) {
     const double by = std::log(tolerance / tolerance_before), did = std::log(ratio / ratio_before);
     const double power = ratio_before > 0 && by * did > 0 ? std::clamp(by / did, 0.7, 2.0) : 0.9;
@@ -157,7 +157,6 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
         if (attempt > 1 && ratio > least_hopeless && tolerance < tolerance_before &&
             std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
         const double next = tolerance * next_tolerance(ratio, tolerance, ratio_before, tolerance_before);
-        if (getenv("RT")) fprintf(stderr,"attempt %d tol %g ratio %g bytes\n",attempt,tolerance/aim_.p99,ratio);
         ratio_before = ratio, tolerance_before = tolerance, tolerance = next;
     }
 }
