@@ -17,7 +17,8 @@ namespace {
 
 constexpr uint32_t lanes = 4;             // children of a node, triangles of a leaf
 constexpr uint32_t worth_sharing = 8192;  // triangles
-constexpr uint32_t worth_counting = 128;  // triangles
+constexpr uint32_t worth_counting = 128;   // triangles,
+constexpr float least_counted = 1e-30f;    // metres: where they lie apart at all
 constexpr uint32_t leaf_bit = 0x80000000u;  // child = leaf_bit | leaf, else a node
 constexpr uint32_t no_child = ~0u;
 
@@ -113,7 +114,7 @@ struct SurfaceIndex::Impl {
         const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
         const uint32_t middle = first + ((last - first) / 2 + lanes - 1) / lanes * lanes;  // leaves are full
         uint32_t begin = first, end = last;
-        if (last - first > worth_counting) sift(first, last, axis, box, middle, begin, end);
+        if (last - first > worth_counting && size[axis] > least_counted) sift(first, last, axis, box, middle, begin, end);
         std::nth_element(items.begin() + begin, items.begin() + middle, items.begin() + end,
                          [axis](const Item& a, const Item& b) { return a.centre[axis] < b.centre[axis]; });
         return middle;
@@ -122,7 +123,7 @@ struct SurfaceIndex::Impl {
     /// left to that.
     void sift(uint32_t first, uint32_t last, int axis, const Box& box, uint32_t middle, uint32_t& begin, uint32_t& end) {
         constexpr uint32_t slices = 64;
-        const float lower = box.lower[axis], scale = (slices - 1) / std::max(box.upper[axis] - lower, FLT_MIN);
+        const float lower = box.lower[axis], scale = (slices - 1) / (box.upper[axis] - lower);
         const auto slice = [&](const Item& item) { return std::min(uint32_t((item.centre[axis] - lower) * scale), slices - 1); };
         uint32_t counts[slices] = {}, chosen = 0;
         for (uint32_t i = first; i < last; ++i) ++counts[slice(items[i])];
