@@ -2,26 +2,25 @@
 #include "split_edges.h"
 
 #include <algorithm>
-#include <cmath>
 #include <unordered_map>
 
 namespace rill::cooker {
 namespace {
 
-constexpr double most_triangles = 4e6;
-constexpr double fullness = 0.2;  // area of the triangles that halving leaves, in squares of the longest edge, about
+constexpr size_t most_triangles = 2'000'000, most_times = 4;  // or so many times those that there were
 constexpr uint32_t whole = ~0u;
 
 /// New vertices in the middle of long edges, by the edge's vertices.
 class Middles {
 public:
-    explicit Middles(Mesh& mesh, double longest) : mesh_(mesh), longest_(longest) {}
-    /// Of the edge from a to b; `whole` if it is not too long.
+    Middles(Mesh& mesh, float longest) : mesh_(mesh), longest_(longest) {}
+    /// Of the edge from a to b; `whole` if it is not too long, or floats know no place between them.
     uint32_t of(uint32_t a, uint32_t b) {
-        if (!(glm::distance(mesh_.positions[a], mesh_.positions[b]) > longest_)) return whole;
+        const glm::vec3 from = mesh_.positions[a], to = mesh_.positions[b], middle = 0.5f * (from + to);
+        if (!(glm::distance(from, to) > longest_) || middle == from || middle == to) return whole;
         const auto [at, is_new] = middles_.try_emplace(uint64_t(std::min(a, b)) << 32 | std::max(a, b), uint32_t(mesh_.positions.size()));
         if (is_new) {
-            mesh_.positions.push_back(0.5f * (mesh_.positions[a] + mesh_.positions[b]));
+            mesh_.positions.push_back(middle);
             if (!mesh_.velocities.empty()) mesh_.velocities.push_back(0.5f * (mesh_.velocities[a] + mesh_.velocities[b]));
         }
         return at->second;
@@ -30,7 +29,7 @@ public:
 
 private:
     Mesh& mesh_;
-    double longest_;
+    float longest_;
     std::unordered_map<uint64_t, uint32_t> middles_;
 };
 
@@ -55,22 +54,13 @@ void split(const Mesh& mesh, const Triangle& t, const std::array<uint32_t, 3>& m
     }
 }
 
-double area_of(const Mesh& mesh) {
-    double area = 0;
-    for (const Triangle& t : mesh.triangles) {
-        const glm::vec3 a = mesh.positions[t[0]];
-        area += 0.5 * glm::length(glm::dvec3(glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a)));
-    }
-    return area;
-}
-
 }  // namespace
 
 void split_long_edges(Mesh& mesh, float longest) {
-    const double limit = std::max(double(longest), std::sqrt(area_of(mesh) / (fullness * most_triangles)));
+    const size_t most = std::max(most_triangles, most_times * mesh.triangles.size());
     std::vector<Triangle> triangles;
-    for (;;) {
-        Middles middles(mesh, limit);
+    while (mesh.triangles.size() < most) {
+        Middles middles(mesh, longest);
         triangles.clear();
         for (const Triangle& t : mesh.triangles)
             split(mesh, t, {middles.of(t[0], t[1]), middles.of(t[1], t[2]), middles.of(t[2], t[0])}, triangles);

@@ -6,9 +6,9 @@
 
 namespace rill::cooker {
 
-/// Halves edges, with the triangles beside them, until none is longer than `longest` metres (more on frames of so much area
-/// that they would take over four million triangles). The surface stays what it is; velocities are interpolated, normals dropped.
-/// Nothing changes where no edge is that long.
+/// Halves edges, with the triangles beside them, until none is longer than `longest` metres, or there are over two million triangles and
+/// four times as many as before. The surface stays what it is; velocities are interpolated, normals dropped. Nothing changes where no
+/// edge is that long.
 void split_long_edges(Mesh& mesh, float longest);
 
 }  // namespace rill::cooker
