@@ -77,6 +77,10 @@ std::vector<uint32_t> label_components(const Mesh& mesh) {
     return parent;
 }
 
+void drop_degenerate(Mesh& mesh) {
+    std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+}
+
 Mesh part_of(const Mesh& mesh, const std::vector<Triangle>& triangles) {
     std::vector<uint32_t> place(mesh.positions.size(), ~0u);
     Mesh part;

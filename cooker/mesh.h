@@ -40,6 +40,8 @@ float median_edge(const Mesh& mesh);
 double signed_volume(const Mesh& mesh);
 /// Per vertex: the connected component it belongs to, named by its first vertex.
 std::vector<uint32_t> label_components(const Mesh& mesh);
+/// Takes out triangles that name a vertex twice.
+void drop_degenerate(Mesh& mesh);
 /// `triangles` of the mesh, with the vertices they use and what those carry.
 Mesh part_of(const Mesh& mesh, const std::vector<Triangle>& triangles);
 

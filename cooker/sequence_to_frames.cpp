@@ -144,7 +144,7 @@ void check_frame(Mesh& mesh, const std::string& name, const std::function<void(c
             if (v >= vertices)
                 throw InputError(name + ": triangle " + std::to_string(i) + " refers to vertex " + std::to_string(v) +
                                  " of " + std::to_string(vertices));
-    std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+    drop_degenerate(mesh);
     if (const size_t closed = weld_seams(mesh); closed > 0 && warn)
         warn(name + " (" + std::to_string(closed) + " edges): vertices at the same place are taken as one");
     if (signed_volume(mesh) < 0) {

@@ -17,8 +17,8 @@ namespace {
 
 constexpr uint32_t lanes = 4;             // children of a node, triangles of a leaf
 constexpr uint32_t worth_sharing = 8192;  // triangles
-constexpr uint32_t worth_counting = 128;   // triangles,
-constexpr float least_counted = 1e-30f;    // metres: where they lie apart at all
+constexpr uint32_t worth_counting = 128;  // triangles,
+constexpr float least_counted = 1e-30f;   // metres: where they lie apart at all
 constexpr uint32_t leaf_bit = 0x80000000u;  // child = leaf_bit | leaf, else a node
 constexpr uint32_t no_child = ~0u;
 
