@@ -14,6 +14,7 @@
 #include "sequence_files.h"
 #include "shapes.h"
 #include "surface_distance.h"
+#include "verify.h"
 
 using namespace rill::cooker;
 
@@ -97,6 +98,14 @@ const Cooked& whole() {
 SurfaceDistance distance(const Mesh& a, const Mesh& b) { return surface_distance(a, SurfaceIndex(a), b, SurfaceIndex(b)); }
 
 }  // namespace
+
+TEST_CASE("a glance at a third of the samples finds about the same errors") {
+    const auto source = open_sequence(whole().input, {});
+    const Verification glance = verify(whole().asset, *source, 2, {}, Scrutiny::glance), plain = verify(whole().asset, *source, 2);
+    CHECK(glance.p99 == doctest::Approx(plain.p99).epsilon(0.04));
+    CHECK(glance.mean == doctest::Approx(plain.mean).epsilon(0.02));
+    CHECK(glance.totals.area < 0.4 * plain.totals.area);
+}
 
 TEST_CASE("the decoded surface lies within the promised error, in every frame") {
     const Cooked& cooked = whole();
