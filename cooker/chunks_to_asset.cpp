@@ -124,7 +124,7 @@ void write_header(ByteWriter& out, const format::Header& h) {
     out.real(h.first_seconds);
     out.vector(h.lower);
     out.vector(h.upper);
-    out.integer(h.reserved);
+    out.integer(h.walls);
     out.integer(format::crc32(out.bytes.data(), out.bytes.size()));
 }
 
@@ -208,7 +208,7 @@ void AssetWriter::Impl::told_from(const glm::vec3& place) {
 }
 
 void set_bounds(format::Header& h, const AssetFacts& facts) {
-    h.cell_size = facts.cell_size;
+    h.cell_size = facts.cell_size, h.walls = facts.walls;
     for (int a = 0; a < 3; ++a) h.lower[a] = facts.lower[a], h.upper[a] = facts.upper[a];
 }
 

@@ -27,6 +27,7 @@ struct AssetFacts {
     std::vector<double> frame_seconds;   ///< empty: evenly spaced; else seconds after the first frame
     float cell_size = 0;
     glm::vec3 lower{}, upper{};
+    uint32_t walls = 0;                  ///< as format::Header
     std::vector<uint8_t> model;
     std::string settings_json;
 };

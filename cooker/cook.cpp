@@ -185,7 +185,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
     const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, survey.diagonal(), duration(job.reader->info()));
     const CookFacts facts = {cook_json(job, settings, survey, aim), job.reader->info().frames_per_second, uint32_t(settings.layers),
-                             survey.edge, survey.lower, survey.upper};
+                             survey.edge, survey.lower, survey.upper, survey.walls};
     const auto reader = apply_fit(std::move(job.reader), survey.fit);
     const SpanCook spans(*reader, settings, survey, job.plan, facts, aim);
     const uint32_t begin = job.plan.first(job.share.first), end = job.plan.last(job.share.end - 1);

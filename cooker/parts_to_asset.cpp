@@ -144,6 +144,7 @@ Joined join(const std::vector<Part>& parts, AssetWriter& writer) {
     joined.facts.cook = parts.front().cook, joined.facts.layers = h.layer_count, joined.facts.edge = h.cell_size;
     joined.facts.frames_per_second = joined.facts.cook.at("source").at("frames_per_second");
     for (int a = 0; a < 3; ++a) joined.facts.lower[a] = h.lower[a], joined.facts.upper[a] = h.upper[a];
+    joined.facts.walls = h.walls;
     for (const Part& part : parts) {
         writer.append(part.directory, uint32_t(joined.all.numbers.empty() ? 0 : joined.all.numbers.size() - 1));
         for (const SpanResult& span : part.spans) add(joined.all, span), joined.spans.push_back(span);
@@ -186,7 +187,7 @@ AssetFacts asset_facts(const CookFacts& cook, const std::vector<int>& numbers, c
     for (size_t i = 2; i < numbers.size(); ++i) facts.frame_step = std::min(facts.frame_step, numbers[i] - numbers[i - 1]);
     facts.layer_count = cook.layers;
     facts.frames_per_second = cook.frames_per_second, facts.first_seconds = seconds.front();
-    facts.cell_size = cook.edge, facts.lower = cook.lower, facts.upper = cook.upper;
+    facts.cell_size = cook.edge, facts.lower = cook.lower, facts.upper = cook.upper, facts.walls = cook.walls;
     const double step = seconds.size() > 1 ? (seconds.back() - seconds.front()) / double(seconds.size() - 1) : 0;
     const bool even = std::ranges::all_of(seconds, [&, i = 0](double s) mutable {
         return std::abs(s - seconds.front() - step * i++) < 1e-6 * std::max(1.0, step);

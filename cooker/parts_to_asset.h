@@ -42,6 +42,7 @@ struct CookFacts {
     uint32_t layers = 1;
     float edge = 1;
     glm::vec3 lower{0}, upper{0};
+    uint32_t walls = 0;               ///< as format::Header
 };
 /// Header facts for these frames; even times are stored as a rate.
 AssetFacts asset_facts(const CookFacts& facts, const std::vector<int>& numbers, const std::vector<double>& seconds);

@@ -2,6 +2,7 @@
 // All stages of the cook, top to bottom, with what passes between them. One window at a time:
 //
 //   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids
+//   walls                  what lies flat in a wall goes through it: the runtime cuts it off there
 //   split_edges            long edges are halved: all that follows is measured and held at vertices
 //   frames_to_samples      where the surface decoded so far is wrong, new points are born
 //   surface_motion         how each surface moves onto the next

@@ -12,6 +12,7 @@
 #include "rate_search.h"
 #include "split_edges.h"
 #include "surface_motion.h"
+#include "walls.h"
 #include "window_to_chunks.h"
 
 namespace rill::cooker {
@@ -28,6 +29,7 @@ constexpr double most_miss = 0.3;            // edges, of such liquid from the s
 constexpr double calm_tolerance = 1.1;       // of such liquid: at the same tolerance its error is a tenth below that of other liquid
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr float longest_edge = 2.5f;         // times the median
+constexpr float through_walls = 0.2f;        // tolerances: how far liquid is cooked to go on beyond them (walls.h)
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
 
 /// Of the error aimed at: what an attempt begins with. Three splashes take about 1.48 at a quarter of an edge; the finer, the
@@ -231,6 +233,7 @@ void SpanCook::load(Window& window, uint32_t last, const Past& past, float toler
         }
         Mesh mesh = reader_.read(size_t(window.first) + s);
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
+        push_through_walls(mesh, survey_.lower, survey_.upper, survey_.walls, survey_.edge, through_walls * tolerance);
         split_long_edges(mesh, longest_edge * survey_.edge);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });

@@ -11,6 +11,7 @@
 #include "parallel.h"
 #include "readers/file_bytes.h"
 #include "surface_distance.h"
+#include "walls.h"
 
 namespace rill::cooker {
 namespace {
@@ -19,33 +20,14 @@ using nlohmann::json;
 constexpr size_t looked_at = 6;  // frames whose topology is looked at
 
 struct FrameFacts {
-    glm::vec3 lower{1e30f}, upper{-1e30f};
+    WallFacts walls;
     float edge = 0;
     size_t triangles = 0, vertices = 0;
 };
 
 FrameFacts facts_of(const Mesh& mesh) {
-    FrameFacts f;
-    for (const Triangle& t : mesh.triangles)
-        for (uint32_t v : t) f.lower = glm::min(f.lower, mesh.positions[v]), f.upper = glm::max(f.upper, mesh.positions[v]);
-    f.edge = median_edge(mesh), f.triangles = mesh.triangles.size(), f.vertices = mesh.positions.size();
-    return f;
-}
-
-/// Share of the area that lies flat in one of the planes of the mesh's own bounds.
-double flat_share(const Mesh& mesh, const FrameFacts& facts) {
-    double flat = 0, all = 0;
-    for (const Triangle& t : mesh.triangles) {
-        const glm::vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
-        const double area = glm::length(glm::cross(b - a, c - a));
-        const float near = 0.05f * facts.edge;
-        bool is_flat = false;
-        for (int k = 0; k < 3; ++k)
-            for (const float plane : {facts.lower[k], facts.upper[k]})
-                is_flat |= std::abs(a[k] - plane) < near && std::abs(b[k] - plane) < near && std::abs(c[k] - plane) < near;
-        all += area, flat += is_flat ? area : 0;
-    }
-    return all > 0 ? flat / all : 0;
+    const float edge = median_edge(mesh);
+    return {wall_facts(mesh, edge), edge, mesh.triangles.size(), mesh.positions.size()};
 }
 
 /// What will disappoint, and what to do about it.
@@ -57,11 +39,10 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         if (facts[i].triangles > 0) full.push_back(i);
     const size_t looks = std::min(looked_at, full.size());
     std::vector<Topology> shapes(looks);
-    std::vector<double> flat(looks);
     parallel_for(looks, jobs, [&](size_t k) {
         const size_t i = full[full.size() * k / looks];
         const Mesh mesh = reader.read_surface(i);
-        shapes[k] = topology(mesh), flat[k] = flat_share(mesh, facts[i]);
+        shapes[k] = topology(mesh);
     });
     char text[300];
     for (size_t k = 0; k < looks; ++k) {
@@ -72,17 +53,12 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         warn(reader.name(i) + text);
         break;
     }
-    const double most = looks > 0 ? *std::max_element(flat.begin(), flat.end()) : 0;
-    if (most < 0.8) return;  // a pool in a tank is what people cook
-    std::snprintf(text, sizeof text, ": the liquid touches its bounds: %.0f %% of the surface lies flat against walls, and costs bytes like any other; "
-                  "leave out sides that are never seen", 100 * most);
-    warn(reader.info().path + text);
 }
 
 json vector_json(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 json to_json(const Survey& s) {
-    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge},
+    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls},
             {"triangles", s.triangles}, {"vertices", s.vertices},
             {"velocity", {{"meaning", int(s.fit.meaning)}, {"factor", s.fit.factor}, {"still", s.fit.still},
                           {"as_stored", s.fit.as_stored}, {"carried", s.fit.carried}, {"conclusive", s.fit.conclusive}}}};
@@ -91,7 +67,7 @@ json to_json(const Survey& s) {
 Survey from_json(const json& j) {
     Survey s;
     for (int a = 0; a < 3; ++a) s.lower[a] = j.at("lower").at(size_t(a)), s.upper[a] = j.at("upper").at(size_t(a));
-    s.edge = j.at("edge"), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
+    s.edge = j.at("edge"), s.walls = j.at("walls"), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
     const json& v = j.at("velocity");
     s.fit.meaning = VelocityMeaning(v.at("meaning").get<int>()), s.fit.factor = v.at("factor"), s.fit.still = v.at("still");
     s.fit.as_stored = v.at("as_stored"), s.fit.carried = v.at("carried"), s.fit.conclusive = v.at("conclusive");
@@ -102,7 +78,7 @@ Survey from_json(const json& j) {
 json kept_survey(const std::string& file, const std::string& states, const ReadOptions& options) {
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
-    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 1) return nullptr;
+    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 2) return nullptr;
     const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
@@ -119,16 +95,18 @@ Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<v
     });
     Survey result;
     std::vector<float> edges;
-    glm::vec3 lower(1e30f), upper(-1e30f);
     for (const FrameFacts& f : facts) {
         if (f.triangles == 0) continue;
-        lower = glm::min(lower, f.lower), upper = glm::max(upper, f.upper);
         edges.push_back(f.edge);
         result.triangles += double(f.triangles), result.vertices += double(f.vertices);
     }
     if (edges.empty()) return result;  // nothing to show, and nothing to measure
     std::nth_element(edges.begin(), edges.begin() + long(edges.size() / 2), edges.end());
-    result.edge = edges[edges.size() / 2], result.lower = lower, result.upper = upper;
+    result.edge = edges[edges.size() / 2];
+    WallFacts walls;
+    for (const FrameFacts& f : facts)
+        if (f.triangles > 0) walls.add(f.walls, result.edge);
+    result.lower = walls.lower, result.upper = walls.upper, result.walls = walls.walls(result.edge);
     inspect(reader, facts, jobs, warn);
     return result;
 }
@@ -167,7 +145,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 1}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 2}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

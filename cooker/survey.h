@@ -15,6 +15,7 @@ namespace rill::cooker {
 struct Survey {
     glm::vec3 lower{0}, upper{0};         ///< of the surface over all frames; equal when there is none
     float edge = 1;                       ///< median edge, metres
+    uint32_t walls = 0;                   ///< as format::Header
     double triangles = 0, vertices = 0;   ///< of all frames together
     VelocityFit fit;
     std::string input;                    ///< hash of the contents of all files

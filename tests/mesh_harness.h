@@ -75,7 +75,7 @@ struct Cloud {
 struct RealField {
     surface::Field field{};
     Block memory;
-    explicit RealField(Cloud& c) {
+    explicit RealField(Cloud& c, const surface::Box& container = surface::everywhere) {
         const format::PointSet points{uint32_t(c.activity.size()),
                                       c.p[0].data(),
                                       c.p[1].data(),
@@ -98,7 +98,7 @@ struct RealField {
                               c.drop_activity.data()};
         for (int a = 0; a < 6; ++a) drops.shape[a] = c.shape[a].data();
         memory = exactly(surface::field_bytes(points.count, drops.count) + 64);
-        surface::begin_field(field, memory.get(), points, drops);
+        surface::begin_field(field, memory.get(), points, drops, container);
         surface::fit_patches(field, 0, field.point_count);
         surface::finish_field(field);
     }

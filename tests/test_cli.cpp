@@ -254,8 +254,6 @@ TEST_CASE("cook: warnings tell what is wrong and what to do about it") {
     check("gap", {3, 4, 6}, [](Mesh&) {}, {"frame 5 is missing", "bake what is missing"});
     check("bare", three, [](Mesh& m) { m.velocities.clear(); }, {"f3.ply: no velocity; it is estimated"});
     check("fast", {3, 6, 9}, [](Mesh& m) { for (glm::vec3& v : m.velocities) v *= 24.0f; }, {"multiplied by 0.04167", "by the frame rate"});
-    const auto box = [](Mesh& m) { for (glm::vec3& x : m.positions) x = glm::clamp(4.0f * x, glm::vec3(-1), glm::vec3(1)); };
-    check("tank", three, [&](Mesh& m) { m = bumpy_sphere(32, 0.5f), m.velocities.assign(m.positions.size(), {}), box(m); }, {"touches its bounds: 100 %", "leave out sides"});
 }
 
 TEST_CASE("cook: dry run, up to date, depfile, segments and link") {

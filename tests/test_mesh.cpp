@@ -474,3 +474,68 @@ TEST_CASE("a hole in the points is bridged: the mesh stays closed and has no sec
     CHECK(topology(m).closed_manifold());
     CHECK(volume(m) == doctest::Approx(4 * pi / 3).epsilon(0.1));
 }
+
+TEST_CASE("liquid is cut off at the sides of its container, exactly") {
+    Cloud ball;
+    add_sphere(ball, {0, 0, 0}, 1, 2000);
+    surface::Box container = surface::everywhere;
+    container.upper[0] = 0.3f, container.lower[2] = -0.2f;
+    const RealField real(ball, container);
+    // Of the ball and the wall, what is nearer speaks; on the wall's other side it alone.
+    const float x[3] = {0.299f, 0.2f, 0.4f}, y[3] = {0.94f, 0.96f, 0.9f}, z[3] = {0, 0, 0}, wall[3] = {-0.001f, 0, 0.1f};
+    const surface::Box box{{0.2f, 0.9f, 0}, {0.4f, 0.96f, 0}};
+    std::vector<uint32_t> candidates(2000);
+    const uint32_t found = surface::gather(real.field, box, candidates.data(), 2000);
+    float value[3], g[3][3];
+    surface::evaluate_gradient(real.field, candidates.data(), found, x, y, z, 3, value, g[0], g[1], g[2], nullptr);
+    for (const int i : {0, 2}) {
+        CHECK(value[i] == doctest::Approx(wall[i]).epsilon(1e-3));
+        CHECK(g[0][i] == 1);
+        CHECK(g[1][i] == 0);
+    }
+    CHECK(value[1] == doctest::Approx(std::hypot(0.2, 0.96) - 1).epsilon(0.1));
+    CHECK(g[1][1] > 0.9);
+    for (const float cell : {0.05f, 0.11f}) {
+        CAPTURE(cell);
+        const Mesh m = mesh(real.field, {cell});
+        CHECK(topology(m).closed_manifold());
+        size_t flat = 0;
+        for (uint32_t v = 0; v < m.vertex_count(); ++v) {
+            const Vec x = m.at(v), n = m.normal_at(v);
+            CHECK(x[0] <= 0.3 + 1e-6);
+            CHECK(x[2] >= -0.2 - 1e-6);
+            if (x[0] < 0.3 - cell / 100 || x[2] < -0.2 + 2 * cell || std::hypot(x[1], x[2]) > std::sqrt(1 - 0.09) - 2 * cell) continue;
+            ++flat;
+            CHECK(n[0] == 1);
+            CHECK(n[1] == 0);
+            CHECK(n[2] == 0);
+        }
+        CHECK(flat > 40);
+    }
+}
+
+TEST_CASE("points that stand beyond their wall lead to it") {
+    constexpr double beyond = 0.03;  // most of the smallest cell
+    Cloud points;
+    for (int axis = 0; axis < 3; ++axis)
+        for (const double side : {-1., 1.})
+            for (int i = -4; i <= 4; ++i)
+                for (int j = -4; j <= 4; ++j) {
+                    Vec place{}, normal{};
+                    normal[size_t(axis)] = side, place[size_t(axis)] = side * (0.5 + beyond);
+                    place[size_t(axis + 1) % 3] = 0.11 * i, place[size_t(axis + 2) % 3] = 0.11 * j;
+                    points.add(place, normal);
+                }
+    const surface::Box container{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
+    const RealField real(points, container);
+    for (const float cell : {0.1f, 0.0937f, 0.04f}) {  // walls between cells, and in them
+        CAPTURE(cell);
+        const Mesh m = mesh(real.field, {cell});
+        CHECK(topology(m).closed_manifold());
+        REQUIRE(m.vertex_count() > 20);
+        for (uint32_t v = 0; v < m.vertex_count(); ++v)
+            for (const double x : m.at(v)) CHECK(std::fabs(x) <= 0.5 + 1e-6);
+        CHECK(volume(m) == doctest::Approx(1).epsilon(0.9 * cell));
+        for (const uint32_t workers : {2u, 8u}) CHECK(mesh(real.field, {cell, 200000, workers}).position == m.position);
+    }
+}

@@ -63,6 +63,9 @@ nlohmann::json describe(const std::string& path) {
     const double points = points_per_window(directory, drops);
     json settings = json::parse(directory.settings_json, nullptr, false);
     if (settings.is_discarded()) settings = nullptr;
+    json walls = json::array();
+    for (uint32_t side = 0; side < 6; ++side)
+        if (h.walls >> side & 1) walls.push_back(std::string{"xyz"[side / 2], "-+"[side % 2]});
     char hash[17];
     std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(h.content_hash));
     return {{"report", "rill info"},
@@ -83,6 +86,7 @@ nlohmann::json describe(const std::string& path) {
             {"median_edge_m", h.cell_size},
             {"lower", {h.lower[0], h.lower[1], h.lower[2]}},
             {"upper", {h.upper[0], h.upper[1], h.upper[2]}},
+            {"walls", walls},
             {"points_per_window", points},
             {"drop_tracks", drops},
             {"most_blocks", blocks},
@@ -139,6 +143,9 @@ void print(const nlohmann::json& info) {
     std::printf("bounds       %g %g %g to %g %g %g m; source edge %.4g m\n", info["lower"][0].get<double>(), info["lower"][1].get<double>(),
                 info["lower"][2].get<double>(), info["upper"][0].get<double>(), info["upper"][1].get<double>(),
                 info["upper"][2].get<double>(), number("median_edge_m"));
+    std::printf("walls       ");
+    for (const nlohmann::json& wall : info["walls"]) std::printf(" %s", wall.get<std::string>().c_str());
+    std::printf(info["walls"].empty() ? " none\n" : "\n");
     std::printf("layers\n");
     for (size_t i = 0; i < info["layers"].size(); ++i) {
         const nlohmann::json& layer = info["layers"][i];

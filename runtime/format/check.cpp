@@ -52,12 +52,13 @@ void read_header(Cursor& cursor, Header& h) {
     h.first_seconds = cursor.f64();
     read_vector(cursor, h.lower);
     read_vector(cursor, h.upper);
-    h.reserved = cursor.u32();
+    h.walls = cursor.u32();
     h.header_crc = cursor.u32();
 }
 
 const char* header_fault(const Header& h, uint64_t file_bytes) {
-    if (h.header_bytes != header_bytes || h.reserved != 0) return "header has a wrong size or reserved field";
+    if (h.header_bytes != header_bytes) return "header has a wrong size";
+    if (h.walls >= 1u << 6 || (h.version == version_4 && h.walls != 0)) return "walls are none of its bounds' sides";
     if (h.file_bytes > file_bytes) return "file is shorter than its header says";
     if (h.file_bytes < file_bytes) return "file is longer than its header says";
     if (h.directory_bytes > max_directory_bytes || h.directory_bytes > file_bytes - header_bytes)
@@ -217,7 +218,7 @@ Status check_header(const uint8_t* bytes, size_t size, uint64_t file_bytes, Head
     Cursor cursor(bytes, header_bytes);
     read_header(cursor, out);
     // Before the checksum: another version may keep its checksum elsewhere.
-    if (out.version != current_version) {
+    if (out.version != version_4 && out.version != current_version) {
         if (reason) *reason = "format version is not known to this library";
         return Status::unknown_format;
     }

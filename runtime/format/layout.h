@@ -18,7 +18,8 @@ enum Version : uint32_t {
     version_2 = 2,  ///< 2026-11: slip: points follow the surface, and say how the liquid slides under them
     version_3 = 3,  ///< 2026-11: steps depend on the life of a track
     version_4 = 4,  ///< 2026-11: smaller records, steps by window; lives by their neighbours'
-    current_version = version_4,
+    version_5 = 5,  ///< 2026-11: walls: the liquid is cut off at sides of its bounds
+    current_version = version_5,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.
@@ -52,7 +53,7 @@ struct Header {
     double first_seconds;       ///< source's clock at frame 0
     float lower[3];             ///< bounds of the source over all frames; equal to upper if empty
     float upper[3];
-    uint32_t reserved;          ///< 0
+    uint32_t walls;             ///< bit 2 axis + (0 lower, 1 upper): the liquid is cut off at that side of its bounds. Version 4: 0
     uint32_t header_crc;        ///< CRC-32 of the 124 bytes before it
 };
 inline constexpr uint32_t header_bytes = 128;

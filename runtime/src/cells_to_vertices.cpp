@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Surface cells → vertices: one per patch, started at the mean of its edge crossings and moved onto the
 // field by Newton steps inside its own cell. (A QEF of Hermite data would also find sharp edges; liquid
-// has few, and the blended field rounds them off anyway.)
+// has few, and the blended field rounds them off anyway.) The exception are walls: a vertex whose crossings lie in walls
+// and elsewhere goes where they meet. (Only the mean of its crossings: mean errors 3 % larger; half-way there 1 %.)
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -110,6 +111,44 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
     return tile.value + cell % 8 + 9 * (cell / 8 % 8 + 9 * (cell / 64));
 }
 
+/// Of what a patch meets: a surface that is no wall.
+constexpr uint32_t meets_free = 1u << 6;
+
+float wall_at(const surface::Box& container, uint32_t side) { return side & 1 ? container.upper[side / 2] : container.lower[side / 2]; }
+
+/// Of the walls, those that run through a box of so many cells, from there on in cells of the tile.
+uint32_t walls_in(const Mesher& m, const Tile& tile, uint32_t walls, const float (&first)[3], float cells) {
+    uint32_t found = 0;
+    for_bits(walls, [&](uint32_t side) {
+        const float at = wall_at(m.input.field->container, side) / tile.cell - first[side / 2];
+        found |= uint32_t(at >= 0 && at <= cells) << side;
+    });
+    return found;
+}
+uint32_t walls_in(const Mesher& m, const Tile& tile) {
+    const float first[3] = {float(tile_cells * tile.coord[0]), float(tile_cells * tile.coord[1]), float(tile_cells * tile.coord[2])};
+    return walls_in(m, tile, meets_free - 1, first, tile_cells);
+}
+
+/// What the crossings of a patch lie in. `corner`: the cell's, in cells.
+uint32_t meets(const Mesher& m, const Tile& tile, uint32_t tile_walls, const CellPatches& patches, uint32_t patch, const float* value, const float (&corner)[3]) {
+    constexpr float same = 1e-3f;  // cells
+    const uint32_t walls = walls_in(m, tile, tile_walls, corner, 1);
+    if (!walls) return meets_free;
+    uint32_t met = 0;
+    for_bits(patches.crossed, [&](uint32_t e) {
+        if (patches.patch[e] != patch) return;
+        const EdgePlace& edge = edge_places[e];
+        const uint32_t axis = e / 4;
+        const float low = value[edge.low], at = corner[axis] + low / (low - value[edge.high]);
+        uint32_t wall = 0;
+        for (uint32_t side = 2 * axis; side < 2 * axis + 2; ++side)
+            if (walls >> side & 1 && std::abs(at - wall_at(m.input.field->container, side) / tile.cell) < same) wall |= 1u << side;
+        met |= wall ? wall : meets_free;
+    });
+    return met ? met : meets_free;  // a patch without crossings
+}
+
 /// Adds a crossing to the sum of its patch, and one to its number.
 void add_crossing(const EdgePlace& edge, const float* value, float (&total)[4]) {
     const float low = value[edge.low], crossing = low / (low - value[edge.high]);
@@ -117,7 +156,7 @@ void add_crossing(const EdgePlace& edge, const float* value, float (&total)[4]) 
 }
 
 /// Appends the patches of a cell to the batch: mean of their crossings. Without any: its middle.
-void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const CellPatches& patches, uint32_t& n) {
+void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t walls, uint32_t cell, const CellPatches& patches, uint32_t& n) {
     const float* value = corner_values(tile, cell);
     float sum[4][4] = {};
     if (patches.count == 1) {  // nearly all: sums that stay in registers
@@ -130,41 +169,67 @@ void place_patches(MesherScratch& s, const Tile& tile, uint32_t cell, const Cell
         std::fill(sum[0], sum[0] + 3, 0.5f), sum[0][3] = 1;
     }
     const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    float corner[3];
+    for (uint32_t a = 0; a < 3; ++a) corner[a] = float(tile_cells * tile.coord[a] + int32_t(at[a]));
     for (uint32_t p = 0; p < std::max<uint32_t>(patches.count, 1); ++p, ++n) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};
         const float share = 1 / sum[p][3];
         for (uint32_t a = 0; a < 3; ++a) {
             const float inside = std::clamp(sum[p][a] * share, cell_margin, 1 - cell_margin);
-            *out[a] = (float(tile_cells * tile.coord[a] + int32_t(at[a])) + inside) * tile.cell;
+            *out[a] = (corner[a] + inside) * tile.cell;
         }
         s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(p);
+        s.meets[n] = uint8_t(walls ? meets(m, tile, walls, patches, p, value, corner) : meets_free);
     }
 }
 
+/// False where it is none.
+bool normalise(float (&v)[3]) {
+    const float length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], scale = 1 / std::sqrt(length2);
+    for (float& c : v) c *= scale;
+    return length2 > 1e-12f && length2 < 1e12f;
+}
+
 /// A normal from the corners' signs, for where the field has none.
-void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t patch, float normal[3]) {
+void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t patch, float (&normal)[3]) {
     const CellPatches patches = patches_of(pattern_at(m, tile, cell));
     const float* value = corner_values(tile, cell);
     for (int a = 0; a < 3; ++a) normal[a] = 0;
     for_bits(patches.crossed, [&](uint32_t e) {
         if (patches.patch[e] == patch) normal[e / 4] += value[edge_places[e].low] < 0 ? 1.f : -1.f;
     });
-    if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) normal[2] = 1;
+    if (!normalise(normal)) normal[0] = normal[1] = 0, normal[2] = 1;
 }
 
-/// One step onto the field, inside the cell. `i`: place in the batch.
-void step(MesherScratch& s, const Tile& tile, uint32_t i) {
+/// One step onto the field and the walls that are met, inside the cell. `i`: place in the batch.
+void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
+    const uint32_t met = s.meets[s.slot[i]], walls = met & (meets_free - 1);
     const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = tile.cell;
-    const float k = s.value[i] / std::max(g2, least_slope * least_slope);
-    if (!(k * k * g2 < size * size)) return;  // farther than a cell, or no field: stay
+    float k = s.value[i] / std::max(g2, least_slope * least_slope);
+    if (!(met & meets_free) || !(k * k * g2 < size * size)) k = 0;  // farther than a cell, or no field: stay
+    if (k == 0 && !walls) return;
     const uint32_t cell = s.cell[s.slot[i]], at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     const float g[3] = {s.gx[i], s.gy[i], s.gz[i]};
+    const surface::Box& container = m.input.field->container;
     float* p[3] = {s.x + i, s.y + i, s.z + i};
     for (uint32_t a = 0; a < 3; ++a) {
         const float corner = float(tile_cells * tile.coord[a] + int32_t(at[a]));
-        *p[a] =
-            std::clamp(*p[a] - k * g[a], (corner + cell_margin) * size, (corner + 1 - cell_margin) * size);
+        float to = k != 0 ? std::clamp(*p[a] - k * g[a], container.lower[a], container.upper[a]) : *p[a];
+        if (walls >> (2 * a) & 3) to = wall_at(container, 2 * a + (walls >> (2 * a + 1) & 1));
+        *p[a] = std::clamp(to, (corner + cell_margin) * size, (corner + 1 - cell_margin) * size);
     }
+}
+
+/// The normal of a patch: of what it meets, each as much. False where there is none.
+bool find_normal(const MesherScratch& s, uint32_t i, float (&normal)[3]) {
+    const uint32_t met = s.meets[s.slot[i]];
+    if (met & meets_free) {
+        normal[0] = s.gx[i], normal[1] = s.gy[i], normal[2] = s.gz[i];
+        if (!(normalise(normal) && std::abs(s.value[i]) < surface::unsupported)) return false;
+        if (met == meets_free) return true;
+    }
+    for_bits(met & (meets_free - 1), [&](uint32_t side) { normal[side / 2] += side & 1 ? 1.f : -1.f; });
+    return normalise(normal);
 }
 
 bool is_moving(const Mesher& m) { return m.input.velocity && m.input.target && m.input.target->velocity.data; }
@@ -200,21 +265,15 @@ struct Output {
 void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t n, uint32_t begin, const Output& output) {
     float* velocity = is_moving(m) ? s.velocity : nullptr;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
-        m.access.evaluate_at_surface(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first,
+        m.access.evaluate_at_surface(m.uncut, candidates, count, s.x + first, s.y + first, s.z + first,
                                    batch, s.value + first, s.gx + first, s.gy + first, s.gz + first,
                                    velocity, trusted_cells * tile.cell);
         for (uint32_t i = first; i < first + batch; ++i) {
-            step(s, tile, i);
+            step(m, s, tile, i);
             const uint32_t slot = s.slot[i];
-            Vertex vertex{{s.x[i], s.y[i], s.z[i]}, {s.gx[i], s.gy[i], s.gz[i]}, {}};
+            Vertex vertex{{s.x[i], s.y[i], s.z[i]}, {}, {}};
             float(&normal)[3] = vertex.normal;
-            float length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
-            if (!(length2 > 1e-12f && length2 < 1e12f) || !(std::abs(s.value[i]) < surface::unsupported)) {
-                guess_normal(m, tile, s.cell[slot], s.patch[slot], normal);
-                length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
-            }
-            const float scale = 1 / std::sqrt(length2);
-            for (float& c : normal) c *= scale;
+            if (!find_normal(s, i, normal)) guess_normal(m, tile, s.cell[slot], s.patch[slot], normal);
             for (uint32_t a = 0; a < 3 && velocity; ++a) vertex.velocity[a] = velocity[i - first + a * batch];
             output.write(s, begin + slot, s.cell[slot], vertex);
         }
@@ -223,6 +282,7 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
 
 /// The vertices of all surface cells of a tile. The corner values are used up then; what the quads need takes their place.
 void place_cells(const Mesher& m, MesherScratch& s, Tile& tile, const Output& output) {
+    const uint32_t walls = walls_in(m, tile);
     uint32_t n = 0, done = 0;
     for_surface_cells(tile, [&](uint32_t cell) {
         const CellPattern pattern = pattern_at(m, tile, cell);
@@ -231,7 +291,7 @@ void place_cells(const Mesher& m, MesherScratch& s, Tile& tile, const Output& ou
             finish_batch(m, s, tile, n, done, output);
             done += n, n = 0;
         }
-        place_patches(s, tile, cell, patches_of(pattern), n);
+        place_patches(m, s, tile, walls, cell, patches_of(pattern), n);
     });
     finish_batch(m, s, tile, n, done, output);
     for_surface_cells(tile, [&](uint32_t cell) {

@@ -14,6 +14,12 @@ namespace {
 constexpr float disc_share = 0.25f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
+/// Points at a wall may stand a little beyond it: the surface is this side, a quarter of a cell and more.
+float in_container(const surface::Field& f, int axis, float place, float cell) {
+    const float lower = f.container.lower[axis] + 0.25f * cell, upper = f.container.upper[axis] - 0.25f * cell;
+    return std::max(lower, std::min(place, upper));
+}
+
 void want(Tile& tile, const int cell[3]) {
     const int row = cell[1] + 8 * cell[2];
     tile.pending[row] |= uint8_t(1 << cell[0] & ~tile.visited[row]);
@@ -52,7 +58,9 @@ void seed_box(Mesher& m, const SeedDisc& disc, int32_t level, const int32_t c[3]
 }
 void seed_point(Mesher& m, uint32_t i) {
     const surface::Field& f = *m.input.field;
-    const float p[3] = {f.x[i], f.y[i], f.z[i]}, n[3] = {f.nx[i], f.ny[i], f.nz[i]};
+    const float n[3] = {f.nx[i], f.ny[i], f.nz[i]};
+    float p[3] = {f.x[i], f.y[i], f.z[i]};
+    for (int a = 0; a < 3; ++a) p[a] = in_container(f, a, p[a], m.input.levels.cell_size);
     SeedDisc disc{p, n, 0, {}};
     if (!leaf_at(m, p, disc.level, disc.home)) return;
     const float radius = disc_share * f.support[i], inverse = 1 / (tile_cells * m.input.levels.cell(disc.level));
@@ -126,7 +134,8 @@ void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
     for (uint32_t c = 0; c < std::min(s.candidate_count, s.most_candidates); ++c) {
         const uint32_t i = s.candidates[c];
         if (i >= f.point_count) break;  // drops come last
-        const float place[3] = {f.x[i], f.y[i], f.z[i]}, normal[3] = {f.nx[i], f.ny[i], f.nz[i]};
+        const float place[3] = {in_container(f, 0, f.x[i], tile.cell), in_container(f, 1, f.y[i], tile.cell), in_container(f, 2, f.z[i], tile.cell)};
+        const float normal[3] = {f.nx[i], f.ny[i], f.nz[i]};
         const float radius = disc_share * f.support[i] * cells + 0.5f;
         float at[3];  // in cells of this tile
         bool touches = true, is_home = true;
@@ -140,6 +149,13 @@ void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
         if (is_home) rows[int(at[1]) + 8 * int(at[2])] |= uint8_t(1 << int(at[0]));
     }
     for (uint32_t row = 0; row < rows_per_tile; ++row) tile.pending[row] |= uint8_t(rows[row] & ~tile.visited[row]);
+}
+
+/// Whether no wall comes near the tile.
+bool is_inside(const surface::Box& container, const Tile& tile) {
+    bool inside = true;
+    for (uint32_t a = 0; a < 3; ++a) inside = inside && corner_at(tile, a, 0) > container.lower[a] && corner_at(tile, a, tile_cells) < container.upper[a];
+    return inside;
 }
 
 /// Evaluates the corners of the pending cells that are not known yet.
@@ -176,8 +192,9 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
             }
     }
     s.corners_evaluated += n;
+    const surface::Field& field = is_inside(m.input.field->container, tile) ? m.uncut : *m.input.field;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
-        m.access.evaluate(*m.input.field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
+        m.access.evaluate(field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
                           s.value + first);
     });
     for (uint32_t i = 0; i < n; ++i) {
@@ -345,6 +362,7 @@ uint32_t prepare_march(void* mesher) {
     Mesher& m = *static_cast<Mesher*>(mesher);
     if (!usable(m.input)) return 0;
     if (m.seeding) {
+        m.uncut = *m.input.field, m.uncut.container = surface::everywhere;
         for (uint32_t i = 0; i < m.input.field->point_count; ++i) seed_point(m, i);
         for (uint32_t i = 0; i < m.input.field->drop_count; ++i) seed_drop(m, i);
     } else {

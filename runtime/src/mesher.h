@@ -83,6 +83,7 @@ struct MesherScratch {
     // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
     uint8_t patch[capacity];
+    uint8_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, and meets_free
     uint16_t vertex[cells_per_tile];
     CellPattern pattern[cells_per_tile];
     ParentCells parents;
@@ -110,6 +111,7 @@ struct OrderedTile {
 struct Mesher {
     MeshLimits limits;
     MeshInput input;
+    surface::Field uncut;      ///< the input's, without its container
     FieldAccess access;
     void (*draw)(const float centre[3], const float normal[3], float radius, uint8_t rows[rows_per_tile]);  ///< surface::Kernels'
     uint32_t cut;

@@ -11,7 +11,8 @@ constexpr uint32_t points_per_task = 256;  // about a millisecond of fitting
 
 uint32_t prepare_fit(void* context) {
     auto& player = *static_cast<Player*>(context);
-    surface::begin_field(player.field, player.field_memory, player.evaluation.points, player.evaluation.drops);
+    surface::begin_field(player.field, player.field_memory, player.evaluation.points, player.evaluation.drops,
+                         player.directory->container);
     return (player.field.point_count + points_per_task - 1) / points_per_task;
 }
 

@@ -257,10 +257,11 @@ size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
            bundle_bytes(bundles_of(points)) + bundle_bytes(bundles_of(bundles_of(points)));
 }
 
-void begin_field(Field& field, void* memory, const format::PointSet& points,
-                 const format::DropSet& drops) noexcept {
+void begin_field(Field& field, void* memory, const format::PointSet& points, const format::DropSet& drops,
+                 const Box& container) noexcept {
     field = {};
     field.kernels = &best_kernels();
+    field.container = container;
     carve(field, {static_cast<uint8_t*>(memory)}, points.count, drops.count);
     sort_points(field, points);
     begin_bundles(field);

@@ -22,6 +22,9 @@ namespace rill::surface {
 struct Box {
     float lower[3], upper[3];
 };
+/// The value of what reaches nothing; and a box without sides.
+inline constexpr float unsupported = 1e30f;
+inline constexpr Box everywhere{{-unsupported, -unsupported, -unsupported}, {unsupported, unsupported, unsupported}};
 
 /// Each sixteen neighbours in the sorted order as one, row by row and padded to whole sixteens: bundle k holds points
 /// or smaller bundles [16 k, 16 k + 16).
@@ -59,6 +62,7 @@ struct Field {
     float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
     Bundles bundles, groups;               ///< of points; of bundles
     float spacing;                         ///< about the distance of points
+    Box container = everywhere;            ///< as given to begin_field()
     const Kernels* kernels;                ///< what evaluation runs on
     float largest_support;
 };
@@ -67,8 +71,9 @@ struct Field {
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept;
 
 /// Step 1, one thread: sorts the points inside `memory`. Non-finite points are dropped. O(n log n).
-void begin_field(Field& field, void* memory, const format::PointSet& points,
-                 const format::DropSet& drops) noexcept;
+/// `container`: where the liquid ends, exactly, wherever it would go on by its points and drops.
+void begin_field(Field& field, void* memory, const format::PointSet& points, const format::DropSet& drops,
+                 const Box& container = everywhere) noexcept;
 /// Step 2, any threads, disjoint ranges [first, last) of sorted points: supports and quadratics.
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
 /// Step 3, one thread: bundles, largest support.
@@ -84,7 +89,6 @@ uint32_t gather(const Field& field, const Box& box, uint32_t* out, uint32_t capa
 /// point about the distance: in the liquid at most Field::spacing, in the air at most the largest support, beyond it
 /// +unsupported. Positions next to each other in the list should be next to each other in space: batches of 16 share
 /// what they are evaluated from.
-inline constexpr float unsupported = 1e30f;
 void evaluate(const Field& field, const uint32_t* candidates, uint32_t candidate_count,
               const float* x, const float* y, const float* z, uint32_t n, float* value) noexcept;
 /// The same with gradient (not normalised, and smoother than the value's own: `ripple` of field_rules.h) and, if

@@ -64,6 +64,20 @@ void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const
         }
 }
 
+/// Beyond a wall there is air, and along it the liquid ends: the intersection with the container.
+void cut_at_walls(const Field& f, const float* const position[3], uint32_t n, const Results& out) {
+    float* const gradient[3] = {out.gx, out.gy, out.gz};
+    for (int a = 0; a < 3; ++a)
+        for (const bool upper : {false, true}) {
+            const float wall = upper ? f.container.upper[a] : f.container.lower[a], outward = upper ? 1.f : -1.f;
+            if (std::fabs(wall) >= unsupported) continue;
+            for (uint32_t i = 0; i < n && out.gx; ++i)
+                if (outward * (position[a][i] - wall) > out.value[i])
+                    for (int b = 0; b < 3; ++b) gradient[b][i] = b == a ? outward : 0;
+            for (uint32_t i = 0; i < n; ++i) out.value[i] = std::max(out.value[i], outward * (position[a][i] - wall));
+        }
+}
+
 /// The first position fills unused lanes: no branch in the kernels.
 void load(float* to, const float* from, uint32_t n) {
     if (n == lanes) {
@@ -118,6 +132,8 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
     for (uint32_t first = 0; first < n; first += lanes)
         evaluation.run(x + first, y + first, z + first, std::min(lanes, n - first), first);
     add_drops(f, candidates + points, count - points, x, y, z, n, out);
+    const float* const position[3] = {x, y, z};
+    cut_at_walls(f, position, n, out);
 }
 
 }  // namespace

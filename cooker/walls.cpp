@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "walls.h"
+
+#include <cmath>
+
+namespace rill::cooker {
+namespace {
+
+constexpr float flat_within = 0.05f;     // edges, of a side's plane
+constexpr float least_room = 2;          // edges, between two sides: a sheet has none
+constexpr double least_share = 0.01;     // of all surface: less are drops and crests that touch a bound now and then
+
+struct Side {
+    int axis;
+    float place, outward;
+};
+Side side_of(int side, const glm::vec3& lower, const glm::vec3& upper) {
+    const int axis = side / 2;
+    return side & 1 ? Side{axis, upper[axis], 1.f} : Side{axis, lower[axis], -1.f};
+}
+
+bool lies_in(const Mesh& mesh, const Triangle& t, const Side& side, float within) {
+    for (uint32_t v : t)
+        if (!(std::fabs(mesh.positions[v][side.axis] - side.place) <= within)) return false;
+    return true;
+}
+
+}  // namespace
+
+WallFacts wall_facts(const Mesh& mesh, float edge) {
+    WallFacts facts;
+    for (const Triangle& t : mesh.triangles)
+        for (uint32_t v : t) facts.lower = glm::min(facts.lower, mesh.positions[v]), facts.upper = glm::max(facts.upper, mesh.positions[v]);
+    for (const Triangle& t : mesh.triangles) {
+        const glm::vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
+        const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
+        facts.area += area;
+        for (int s = 0; s < 6; ++s)
+            if (lies_in(mesh, t, side_of(s, facts.lower, facts.upper), flat_within * edge)) facts.flat[s] += area;
+    }
+    return facts;
+}
+
+void WallFacts::add(const WallFacts& other, float edge) {
+    for (int s = 0; s < 6; ++s) {
+        const Side ours = side_of(s, lower, upper), theirs = side_of(s, other.lower, other.upper);
+        const float farther = (theirs.place - ours.place) * ours.outward;
+        if (farther > flat_within * edge) flat[s] = 0;
+        if (farther >= -flat_within * edge) flat[s] += other.flat[s];
+    }
+    lower = glm::min(lower, other.lower), upper = glm::max(upper, other.upper), area += other.area;
+}
+
+uint32_t WallFacts::walls(float edge) const {
+    uint32_t walls = 0;
+    for (int s = 0; s < 6; ++s) {
+        const bool has_room = upper[s / 2] - lower[s / 2] > least_room * edge;
+        walls |= uint32_t(has_room && flat[s] > least_share * area) << s;
+    }
+    return walls;
+}
+
+void push_through_walls(Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper, uint32_t walls, float edge, float by) {
+    for (int s = 0; s < 6; ++s) {
+        if (!(walls >> s & 1)) continue;
+        const Side side = side_of(s, lower, upper);
+        std::vector<uint8_t> flat(mesh.positions.size(), 0);
+        for (const Triangle& t : mesh.triangles)
+            if (lies_in(mesh, t, side, flat_within * edge))
+                for (uint32_t v : t) flat[v] = 1;
+        for (size_t v = 0; v < flat.size(); ++v)
+            if (flat[v]) mesh.positions[v][side.axis] = side.place + side.outward * by;
+    }
+}
+
+}  // namespace rill::cooker

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// Liquid in a box: which sides of its bounds are walls, and that what is decoded ends at them exactly.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "asset_directory.h"
+#include "asset_player.h"
+#include "cook.h"
+#include "sequence_files.h"
+#include "shapes.h"
+#include "surface_distance.h"
+#include "walls.h"
+
+using namespace rill::cooker;
+
+namespace {
+
+constexpr uint32_t all_but_top = 0b011111;
+
+/// A tank of 2 × 2 m with waves on top of 1 m of liquid.
+Mesh tank(double seconds) {
+    Mesh mesh = sphere(96, 1);
+    mesh.velocities.assign(mesh.positions.size(), glm::vec3(0));
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        const glm::vec3 p = mesh.positions[v];
+        glm::vec3& x = mesh.positions[v];
+        const float largest = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+        x = p / largest;  // a cube, its edges between vertices here and there
+        x = glm::clamp(x * 1.02f, glm::vec3(-1), glm::vec3(1));
+        x.z *= 0.5f;
+        if (p.z < largest) continue;
+        const float phase = 3 * x.x + 2 * x.y - 4 * float(seconds);
+        x.z += 0.1f * std::sin(phase), mesh.velocities[v].z = -0.4f * std::cos(phase);
+    }
+    return mesh;
+}
+Mesh cube(const glm::vec3& lower, const glm::vec3& upper) {
+    Mesh mesh = tank(0);
+    for (glm::vec3& x : mesh.positions) x = lower + (upper - lower) * glm::clamp(2.f * x + 0.5f, glm::vec3(0), glm::vec3(1));
+    return mesh;
+}
+WallFacts facts_of(const Mesh& mesh) { return wall_facts(mesh, median_edge(mesh)); }
+uint32_t walls_of(const Mesh& mesh) { return facts_of(mesh).walls(median_edge(mesh)); }
+
+}  // namespace
+
+TEST_CASE("walls are the sides of the bounds that liquid lies flat in") {
+    CHECK(walls_of(tank(0)) == all_but_top);
+    CHECK(walls_of(cube({0, 0, 0}, {1, 1, 1})) == 0b111111);
+    CHECK(walls_of(sphere(96, 1)) == 0);
+    CHECK(walls_of(Mesh{}) == 0);
+    Mesh sheet = plane(20, 1);
+    CHECK(walls_of(sheet) == 0);  // both its sides are one
+}
+
+TEST_CASE("of many frames, only those count that reach the bounds of all") {
+    const Mesh low = cube({0, 0, 0}, {1, 1, 1}), high = cube({0, 0, 0.5f}, {1, 1, 1.5f});
+    const float edge = median_edge(low);
+    for (const bool low_first : {true, false}) {
+        CAPTURE(low_first);
+        WallFacts facts;
+        facts.add(facts_of(low_first ? low : high), edge), facts.add(facts_of(low_first ? high : low), edge);
+        CHECK(facts.area == doctest::Approx(12).epsilon(0.02));
+        CHECK(facts.flat[0] == doctest::Approx(2).epsilon(0.1));
+        CHECK(facts.flat[4] == doctest::Approx(1).epsilon(0.1));  // the floor of the low one
+        CHECK(facts.flat[5] == doctest::Approx(1).epsilon(0.1));  // the top of the high one
+        CHECK(facts.lower.z == 0);
+        CHECK(facts.upper.z == 1.5f);
+        CHECK(facts.walls(edge) == 0b111111);
+    }
+    // A drop that touches the floor once is no reason.
+    WallFacts facts;
+    for (int i = 0; i < 500; ++i) facts.add(facts_of(sphere(32, 1)), edge);
+    facts.add(facts_of(cube({-0.2f, -0.2f, -1}, {0.2f, 0.2f, -0.6f})), edge);
+    CHECK(facts.flat[4] > 0);
+    CHECK(facts.walls(edge) == 0);
+}
+
+TEST_CASE("what lies flat in a wall goes through it, and nothing else moves") {
+    const Mesh before = tank(0);
+    const glm::vec3 lower(-1, -1, -0.5f), upper(1, 1, 0.6f);
+    Mesh mesh = before;
+    push_through_walls(mesh, lower, upper, all_but_top, median_edge(before), 0.01f);
+    size_t moved = 0;
+    for (size_t v = 0; v < mesh.positions.size(); ++v)
+        for (int a = 0; a < 3; ++a) {
+            const float was = before.positions[v][a], is = mesh.positions[v][a];
+            if (was == is) continue;
+            ++moved;
+            CHECK(std::fabs(was - (is < 0 ? lower[a] : upper[a])) <= 0.05f * median_edge(before));
+            CHECK(is == doctest::Approx(is < 0 ? lower[a] - 0.01f : upper[a] + 0.01f));
+        }
+    CHECK(moved > 2000);
+    Mesh ball = sphere(32, 1);
+    push_through_walls(ball, glm::vec3(-1), glm::vec3(1), 0b111111, median_edge(ball), 0.01f);
+    CHECK(ball.positions == sphere(32, 1).positions);  // it only touches
+}
+
+TEST_CASE("decoded liquid ends at its walls exactly, and its rims are where the source's are") {
+    const TestFolder folder;
+    constexpr int frames = 4;
+    for (int i = 0; i < frames; ++i) put_file(folder / "in" + "/f" + std::to_string(1 + i) + ".ply", plain_ply(tank(i / 24.)));
+    CookSettings settings;
+    settings.jobs = 2;
+    cook(folder / "in", folder / "out.rill", settings, [](const CookProgress&) {});
+    CHECK(read_directory(folder / "out.rill").header.walls == all_but_top);
+    AssetPlayer player(folder / "out.rill", 2);
+    for (uint32_t i = 0; i < frames; ++i)
+        for (const float coarser : {1.f, 2.f, 4.f}) {
+            CAPTURE(i);
+            CAPTURE(coarser);
+            const Mesh source = tank(i / 24.);
+            const float edge = median_edge(source);
+            const Mesh decoded = player.mesh(player.frame_seconds(i), coarser * edge);
+            const Topology shape = topology(decoded);
+            CHECK(shape.open_edges == 0);
+            CHECK(shape.non_manifold_edges == 0);
+            CHECK(shape.components == 1);
+            CHECK(shape.volume == doctest::Approx(signed_volume(source)).epsilon(coarser > 1 ? 0.02 * coarser : 0.005));
+            size_t flat = 0, near = 0;
+            for (const glm::vec3& x : decoded.positions) {
+                const float side = std::max(std::fabs(x.x), std::fabs(x.y));
+                CHECK(side <= 1 + 1e-6f);
+                CHECK(x.z >= -0.5f - 1e-6f);
+                const bool is_rim = x.z > 0.3f || std::min(std::fabs(x.x), std::fabs(x.y)) > 1 - 2 * coarser * edge || x.z < -0.5f + 2 * coarser * edge;
+                if (is_rim || side < 1 - edge) continue;
+                ++near, flat += side > 1 - coarser * edge / 100;  // vertices keep a 128th off the faces of their cells
+            }
+            CHECK(near > 50 / (coarser * coarser));
+            CHECK(double(flat) > 0.85 * double(near));  // the rest is told to end before the wall, by less than the tolerance
+            if (coarser == 1) CHECK(surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded)).mean < 0.1 * edge);
+        }
+}
