@@ -98,25 +98,55 @@ TEST_CASE("one vertex far off, and the piece is no drop") {
     CHECK(take_drops(spiked, edge, tolerance).empty());
 }
 
-TEST_CASE("air that no cell shows is a ball that one does, liquid as small is as it is") {
+TEST_CASE("air and liquid that no cell shows are balls that one does") {
     const glm::vec3 centre(1, 2, 3);
     Mesh speck = sphere(8, 0.02f * edge, centre);
     Mesh drop = speck;
     const std::vector<Drop> liquid = take_drops(drop, edge, 0.2f * edge);
     REQUIRE(liquid.size() == 1);
-    CHECK(liquid[0].shape[0] == doctest::Approx(0.02 * edge).epsilon(0.1));
+    CHECK(liquid[0].shape[0] == doctest::Approx(0.15 * edge).epsilon(0.001));
+    CHECK(liquid[0].volume > 0);
     for (Triangle& t : speck.triangles) std::swap(t[1], t[2]);
     speck.velocities.assign(speck.positions.size(), glm::vec3(4, 5, 6));
+    const Mesh around = sphere(40, 2, centre + glm::vec3(0.5f, 0, 0));
+    join(speck, around);
     const std::vector<Drop> air = take_drops(speck, edge, 1e-4f * edge);
     REQUIRE(air.size() == 1);
     CHECK(glm::distance(air[0].centre, centre) < 0.01f * edge);
     CHECK(glm::distance(air[0].velocity, glm::vec3(4, 5, 6)) < 1e-4f);
     CHECK(air[0].volume == doctest::Approx(-0.1 * edge * edge * edge));
     CHECK(air[0].shape[0] == doctest::Approx(-0.288 * edge).epsilon(0.01));
-    CHECK(speck.triangles.empty());
+    CHECK(speck.triangles.size() == around.triangles.size());
     Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 2e-5f}}, {}, {}, {{0, 1, 2}, {1, 3, 2}}};  // open: no air, whatever its volume
     CHECK(take_drops(sheet, edge, edge).empty());
     CHECK(sheet.triangles.size() == 2);
+}
+
+TEST_CASE("scraps that are no ellipsoids are balls large enough to be seen: of liquid in the air, however they are wound") {
+    const Mesh pool = sphere(40, 1);
+    Mesh flake = sphere(6, 0.02f * edge, {1.5f, 0, 0});
+    for (glm::vec3& x : flake.positions) x.z *= 0.05f;
+    for (const bool inside_out : {false, true})
+        for (const bool in_air : {true, false}) {
+            CAPTURE(inside_out);
+            CAPTURE(in_air);
+            Mesh mesh = pool, scrap = flake;
+            for (Triangle& t : scrap.triangles)
+                if (inside_out) std::swap(t[1], t[2]);
+            for (glm::vec3& x : scrap.positions)
+                if (!in_air) x.x -= 1;
+            join(mesh, scrap);
+            const std::vector<Drop> drops = take_drops(mesh, edge, 0.3f * edge);
+            REQUIRE(drops.size() == 1);
+            CHECK(mesh.triangles.size() == pool.triangles.size());
+            const float radius = in_air ? 0.15f * edge : -0.288f * edge;
+            for (size_t k = 0; k < 3; ++k) CHECK(drops[0].shape[k] == doctest::Approx(radius).epsilon(0.01));
+            CHECK((drops[0].volume > 0) == in_air);
+            CHECK(glm::distance(drops[0].centre, glm::vec3(in_air ? 1.5f : 0.5f, 0, 0)) < 0.01f * edge);
+        }
+    Mesh wide = sphere(6, 2 * edge, {1.5f, 0, 0});  // as flat, but no scrap
+    for (glm::vec3& x : wide.positions) x.z *= 0.001f;
+    CHECK(take_drops(wide, edge, 0.3f * edge).empty());
 }
 
 TEST_CASE("drops are tracked through what they meet: two cross, one comes and goes") {

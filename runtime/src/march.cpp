@@ -78,7 +78,7 @@ void seed_point(Mesher& m, uint32_t i) {
 
 /// A drop that no corner of the lattice lies in would not be seen, or come and go as it flies: it moves onto the nearest one.
 void show_drop(const Mesher& m, uint32_t i) {
-    constexpr float least = 0.2f, share = 0.5f;  // radius, of a cell: seen at all; where in the drop the corner lies then
+    constexpr float least = 0.1f, share = 0.5f;  // radius, of a cell: seen at all; where in the drop the corner lies then
     constexpr int around = 4;                    // corners each way: those of its cell and the next; larger drops nearly always hold one
     const surface::Field& f = *m.input.field;
     const float centre[3] = {f.dx[i], f.dy[i], f.dz[i]};
