@@ -130,12 +130,12 @@ TEST_CASE("scraps that are no ellipsoids are balls large enough to be seen: of l
         for (const bool in_air : {true, false}) {
             CAPTURE(inside_out);
             CAPTURE(in_air);
-            Mesh mesh = pool, scrap = flake;
+            Mesh mesh, scrap = flake;
             for (Triangle& t : scrap.triangles)
                 if (inside_out) std::swap(t[1], t[2]);
             for (glm::vec3& x : scrap.positions)
                 if (!in_air) x.x -= 1;
-            join(mesh, scrap);
+            join(mesh, pool), join(mesh, scrap);
             const std::vector<Drop> drops = take_drops(mesh, edge, 0.3f * edge);
             REQUIRE(drops.size() == 1);
             CHECK(mesh.triangles.size() == pool.triangles.size());
