@@ -144,6 +144,12 @@ TEST_CASE("scraps that are no ellipsoids are balls large enough to be seen: of l
             CHECK((drops[0].volume > 0) == in_air);
             CHECK(glm::distance(drops[0].centre, glm::vec3(in_air ? 1.5f : 0.5f, 0, 0)) < 0.01f * edge);
         }
+    Mesh thin = sphere(8, 0.5f * edge, {1.5f, 0, 0});
+    for (glm::vec3& x : thin.positions) x.z *= 0.1f;  // flatter than an ellipsoid may be
+    const std::vector<Drop> ball = take_drops(thin, edge, 0.3f * edge);
+    REQUIRE(ball.size() == 1);
+    CHECK(ball[0].shape[0] > 0.15f * edge);
+    CHECK(ball[0].shape[0] < 0.25f * edge);
     Mesh wide = sphere(6, 2 * edge, {1.5f, 0, 0});  // as flat, but no scrap
     for (glm::vec3& x : wide.positions) x.z *= 0.001f;
     CHECK(take_drops(wide, edge, 0.3f * edge).empty());
