@@ -97,16 +97,16 @@ std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& tria
     return drop;
 }
 
-/// A ball of so many cubic metres in place of what is too small to be fitted.
+/// Where what is too small to be fitted is, and how large; add_specks() gives it a shape.
 Drop speck_of(const Mesh& mesh, const std::vector<uint32_t>& triangles, double volume) {
     const std::vector<uint32_t> vertices = vertices_of(mesh, triangles);
-    const float share = 1 / float(vertices.size()), radius = float(std::cbrt(3 / (4 * std::numbers::pi) * volume));
+    const float share = 1 / float(vertices.size());
     Drop drop;
     for (uint32_t v : vertices) {
         drop.centre += share * mesh.positions[v];
         if (!mesh.velocities.empty()) drop.velocity += share * mesh.velocities[v];
     }
-    drop.volume = float(volume), drop.shape = {radius, radius, radius, 0, 0, 0};
+    drop.volume = float(std::abs(volume));
     return drop;
 }
 
@@ -117,25 +117,23 @@ float extent_of(const Mesh& mesh, const std::vector<uint32_t>& triangles) {
     return std::max({upper.x - lower.x, upper.y - lower.y, upper.z - lower.z});
 }
 
-/// Whether x lies in the air around the mesh. Of a speck its own winding does not tell.
-bool is_in_air(const SurfaceIndex& around, const glm::vec3& x) {
-    const SurfaceIndex::Hit hit = around.closest(x, INFINITY);
-    if (around.mesh().triangles.empty()) return true;
-    const Triangle& t = around.mesh().triangles[hit.triangle];
-    const glm::vec3 a = around.mesh().positions[t[0]], b = around.mesh().positions[t[1]], c = around.mesh().positions[t[2]];
-    return glm::dot(glm::cross(b - a, c - a), x - hit.point) >= 0;
-}
-
-/// Liquid in the air and air in the liquid, of what size it is seen at. `around`: the mesh without them.
+/// Balls of liquid in the air and of air in the liquid, of a size that is seen. `around`: the mesh without them. On which side of
+/// it they lie tells what they are, not how they are wound.
 void add_specks(const Mesh& around, std::vector<Drop>& specks, float edge, float tolerance, std::vector<Drop>& drops) {
     if (specks.empty()) return;
     const SurfaceIndex index(around);
+    const std::vector<glm::vec3> normals = vertex_normals(around);
+    const auto is_in_air = [&](const glm::vec3& x) {
+        if (around.triangles.empty()) return true;
+        const SurfaceIndex::Hit hit = index.closest(x, INFINITY);
+        return glm::dot(value_at(hit, around.triangles[hit.triangle], normals), x - hit.point) >= 0;
+    };
+    constexpr float ball = float(4 * std::numbers::pi / 3);
     const float least_radius = std::max(least_speck * edge, 0.3f * tolerance);  // the lattice of shapes must know it
+    const float least_volume = ball * least_radius * least_radius * least_radius, air = float(least_air) * edge * edge * edge;
     for (Drop& speck : specks) {
-        const bool liquid = is_in_air(index, speck.centre);
-        const float volume = float(least_air) * edge * edge * edge, of_air = std::cbrt(float(3 / (4 * std::numbers::pi)) * volume);
-        const float radius = liquid ? std::max(speck.shape[0], least_radius) : -of_air;
-        if (!liquid) speck.volume = -volume;
+        speck.volume = is_in_air(speck.centre) ? std::max(speck.volume, least_volume) : -air;
+        const float radius = std::cbrt(speck.volume / ball);
         speck.shape = {radius, radius, radius, 0, 0, 0};
         drops.push_back(speck);
     }
@@ -170,7 +168,7 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
         const bool is_small = std::abs(moments.volume) < least_air * cube, is_speck = (is_small && moments.volume < 0) || extent < 2 * least_speck * edge;
         const auto drop = is_speck ? std::nullopt : fit_drop(mesh, triangles[s], moments, most_volume * cube, tolerance);
         if (drop) drops.push_back(*drop);
-        else if (is_speck || (is_small && extent < speck_extent * edge)) specks.push_back(speck_of(mesh, triangles[s], std::abs(moments.volume)));
+        else if (is_speck || (is_small && extent < speck_extent * edge)) specks.push_back(speck_of(mesh, triangles[s], moments.volume));
         else continue;
         marked[names[s]] = any = true;
     }

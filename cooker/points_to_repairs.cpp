@@ -62,9 +62,7 @@ float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most) {
     const SurfaceIndex::Hit hit = frame.index.closest(x, most);
     if (!(hit.distance < most)) return 0;
     const Triangle& t = frame.mesh.triangles[hit.triangle];
-    const auto& n = frame.mesh.normals;
-    const glm::vec3 normal = hit.barycentric.x * n[t[0]] + hit.barycentric.y * n[t[1]] + hit.barycentric.z * n[t[2]];
-    return glm::dot(normal, x - hit.point) > 0 ? -hit.distance : hit.distance;
+    return glm::dot(value_at(hit, t, frame.mesh.normals), x - hit.point) > 0 ? -hit.distance : hit.distance;
 }
 
 /// A torn place: probes in it whose side is known, and points that could be born there.

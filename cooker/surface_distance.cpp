@@ -66,9 +66,7 @@ Sums measure(const Mesh& from, const std::vector<glm::vec3>& from_normals, const
     auto sample = [&](const glm::vec3& x, const glm::vec3& normal, double weight) {
         const SurfaceIndex::Hit hit = to.closest(x, infinity);
         sums.add(hit.distance, weight);
-        const Triangle& t = to.mesh().triangles[hit.triangle];
-        sums.add_angle(normal, to_normals[t[0]] * hit.barycentric.x + to_normals[t[1]] * hit.barycentric.y +
-                                   to_normals[t[2]] * hit.barycentric.z, weight);
+        sums.add_angle(normal, value_at(hit, to.mesh().triangles[hit.triangle], to_normals), weight);
         return hit.distance;
     };
     for (size_t i = 0; i < from.triangles.size(); ++i) {

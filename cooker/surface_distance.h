@@ -32,6 +32,11 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
+/// Of vertices, interpolated at a hit in triangle `t`.
+inline glm::vec3 value_at(const SurfaceIndex::Hit& hit, const Triangle& t, const std::vector<glm::vec3>& values) {
+    return hit.barycentric.x * values[t[0]] + hit.barycentric.y * values[t[1]] + hit.barycentric.z * values[t[2]];
+}
+
 /// Which of the positions stand `beyond` metres or more off the surface, ascending.
 std::vector<uint32_t> find_beyond(const SurfaceIndex& surface, const std::vector<glm::vec3>& positions, float beyond, int jobs);
 

@@ -62,10 +62,6 @@ void for_each(size_t count, int jobs, const Work& work) {
     });
 }
 
-glm::vec3 at(const SurfaceIndex::Hit& hit, const Triangle& t, const std::vector<glm::vec3>& values) {
-    return hit.barycentric.x * values[t[0]] + hit.barycentric.y * values[t[1]] + hit.barycentric.z * values[t[2]];
-}
-
 Mesh moved_by(const Mesh& mesh, const std::vector<glm::vec3>& motion) {
     Mesh moved;
     moved.triangles = mesh.triangles, moved.positions = mesh.positions;
@@ -83,7 +79,7 @@ std::vector<Pull> find_pulls(const SurfaceIndex& moved, const Neighbours& neighb
         const size_t i = k * stride;
         const SurfaceIndex::Hit hit = to.closest(here[i], reach);
         if (!(hit.distance < reach)) return;
-        const glm::vec3 n = at(hit, to.mesh().triangles[hit.triangle], to_normals);
+        const glm::vec3 n = value_at(hit, to.mesh().triangles[hit.triangle], to_normals);
         if (glm::dot(n, neighbours.normal(here, i)) > alike) pulls[i].add(hit.point - here[i], n, 1);
     });
     // What the next surface has and nothing of this one goes to: crowns and fingers as they shoot out.
@@ -178,7 +174,7 @@ std::vector<glm::vec3> motion_goes_on(const SurfaceIndex& before, const std::vec
     const float near = reach * median_edge(now);
     for_each(next.size(), jobs, [&](size_t i) {
         const SurfaceIndex::Hit hit = index.closest(now.positions[i], near);
-        if (hit.distance < near) next[i] = inertia * longer * at(hit, moved.triangles[hit.triangle], motion);
+        if (hit.distance < near) next[i] = inertia * longer * value_at(hit, moved.triangles[hit.triangle], motion);
     });
     return next;
 }
@@ -190,7 +186,7 @@ std::vector<glm::vec3> liquid_motion(const Mesh& from, const Mesh& to, const Sur
     for_each(motion.size(), jobs, [&](size_t i) {
         const glm::vec3 step = dt * from.velocities[i];
         const SurfaceIndex::Hit hit = to_index.closest(from.positions[i] + step, std::numeric_limits<float>::infinity());
-        motion[i] = 0.5f * (step + dt * at(hit, to.triangles[hit.triangle], to.velocities));
+        motion[i] = 0.5f * (step + dt * value_at(hit, to.triangles[hit.triangle], to.velocities));
     });
     return motion;
 }

@@ -17,6 +17,11 @@ TEST_CASE("info") {
     CHECK(json["first_frame"] == 3);
     CHECK(json["file_bytes"] == fs::file_size(clip().asset));
     CHECK(json["windows"].size() >= 2);
+    CHECK(json["walls"].empty());
+    CHECK(has(text, "walls        none"));
+    const std::string tank = RILL_GOLDEN "/v5.rill";
+    CHECK(has(run_rill("info " + tank), "walls        x- x+ y- y+ z-\n"));
+    CHECK(nlohmann::json::parse(run_rill("info --json " + tank).text)["walls"] == nlohmann::json({"x-", "x+", "y-", "y+", "z-"}));
     check_bytes(clip().asset);
     for (const char* kind : {"structure", "births", "first_coefficients", "motion", "normals"}) CHECK(json["bytes"]["layers"][0][kind] > 0);
 }

@@ -99,7 +99,7 @@ TEST_CASE("what lies flat in a wall goes through it, and nothing else moves") {
     CHECK(ball.positions == sphere(32, 1).positions);  // it only touches
 }
 
-TEST_CASE("decoded liquid ends at its walls exactly, and its rims are where the source's are") {
+TEST_CASE("decoded liquid ends at its walls exactly, closed and whole in cells of any size") {
     const TestFolder folder;
     constexpr int frames = 4;
     for (int i = 0; i < frames; ++i) put_file(folder / "in" + "/f" + std::to_string(1 + i) + ".ply", plain_ply(tank(i / 24.)));
