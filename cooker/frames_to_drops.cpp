@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "pipeline.h"
+#include "points_to_mesh.h"
 
 namespace rill::cooker {
 namespace {
@@ -65,17 +66,26 @@ Moments moments_of(const Mesh& mesh, const std::vector<uint32_t>& triangles) {
     return m;
 }
 
+/// How far a piece's vertices may lie from its ellipsoid, metres.
+struct Fit {
+    float rms, most;
+    float least = 0;  ///< no half axis is shorter, metres; nor any too short in the longest: 0: then there is no ellipsoid
+};
+
 /// The ellipsoid of the piece's centre and second moments, as large as to go through its vertices on average: it is decoded as a
 /// polyhedron within, like the source's. (Of the piece's volume instead, droplets lose a fifth of it: of 143 pieces of more than
 /// eight cells in frames 14:41 of dam_break 125 were left of that size, now 140.) None where the vertices are farther off.
-std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, const Moments& m, double most, float tolerance) {
-    if (!(std::abs(m.volume) > 0 && std::abs(m.volume) <= most)) return {};
+std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, const Moments& m, const Fit& fit) {
+    if (!(std::abs(m.volume) > 0)) return {};
     const glm::vec3 base = base_of(mesh, triangles);
     const Eigen::Vector3d centre = m.first / m.volume;
     const Eigen::Matrix3d covariance = m.second / m.volume - centre * centre.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(5 * covariance);  // of a solid ellipsoid: S² / 5
-    if (axes.info() != Eigen::Success || !(axes.eigenvalues()[0] > flattest * flattest * axes.eigenvalues()[2])) return {};
-    const Eigen::Matrix3d inverse = axes.operatorInverseSqrt();
+    if (axes.info() != Eigen::Success) return {};
+    const double shortest = flattest * flattest * axes.eigenvalues()[2];
+    if (!(axes.eigenvalues()[0] > shortest) && fit.least == 0) return {};
+    const Eigen::Vector3d half = axes.eigenvalues().cwiseMax(std::max(shortest, double(fit.least) * fit.least)).cwiseSqrt();
+    const Eigen::Matrix3d turn = axes.eigenvectors(), inverse = turn * half.cwiseInverse().asDiagonal() * turn.transpose();
     const std::vector<uint32_t> vertices = vertices_of(mesh, triangles);
     const double share = 1 / double(vertices.size());
     const auto on_ball = [&](uint32_t v) -> Eigen::Vector3d { return inverse * (eigen(mesh.positions[v] - base) - centre); };
@@ -85,12 +95,12 @@ std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& tria
     for (uint32_t v : vertices) {
         const Eigen::Vector3d q = on_ball(v);
         const double length = q.norm(), off = (length - scale) * length / std::max((inverse * q).norm(), 1e-12);
-        if (!(std::abs(off) <= most_off * tolerance)) return {};
+        if (!(std::abs(off) <= fit.most)) return {};
         square += share * off * off;
         if (!mesh.velocities.empty()) drop.velocity += float(share) * mesh.velocities[v];
     }
-    if (!(std::sqrt(square) <= most_rms * tolerance)) return {};
-    const Eigen::Matrix3d shape = (m.volume < 0 ? -scale : scale) * axes.operatorSqrt();
+    if (!(std::sqrt(square) <= fit.rms)) return {};
+    const Eigen::Matrix3d shape = (m.volume < 0 ? -scale : scale) * turn * half.asDiagonal() * turn.transpose();
     drop.centre = base + glm::vec3(centre.x(), centre.y(), centre.z());
     drop.volume = float(m.volume);
     drop.shape = {float(shape(0, 0)), float(shape(1, 1)), float(shape(2, 2)), float(shape(0, 1)), float(shape(0, 2)), float(shape(1, 2))};
@@ -139,6 +149,31 @@ void add_specks(const Mesh& around, std::vector<Drop>& specks, float edge, float
     }
 }
 
+/// Triangles of one connected piece of a mesh.
+struct Piece {
+    uint32_t name;                   ///< label_components()
+    std::vector<uint32_t> triangles;
+    Moments moments;
+};
+
+/// Closed pieces of up to `most_volume`; a piece of a sheet has none that means anything.
+std::vector<Piece> small_pieces(const Mesh& mesh, const std::vector<uint32_t>& label, float edge) {
+    std::vector<uint32_t> size(mesh.positions.size(), 0);
+    for (const Triangle& t : mesh.triangles) ++size[label[t[0]]];
+    constexpr uint32_t most_triangles = 600;  // of so small a volume: beyond, it is no drop
+    std::vector<uint32_t> slot(mesh.positions.size(), ~0u);
+    std::vector<Piece> pieces;
+    for (uint32_t v = 0; v < size.size(); ++v)
+        if (size[v] > 0 && size[v] <= most_triangles) slot[v] = uint32_t(pieces.size()), pieces.push_back({v, {}, {}});
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+        if (const uint32_t s = slot[label[mesh.triangles[t][0]]]; s != ~0u) pieces[s].triangles.push_back(t);
+    for (Piece& piece : pieces) piece.moments = moments_of(mesh, piece.triangles);
+    std::erase_if(pieces, [edge](const Piece& p) {
+        return p.moments.facing.norm() > most_open * p.moments.area || std::abs(p.moments.volume) > most_volume * std::pow(double(edge), 3);
+    });
+    return pieces;
+}
+
 struct Match {
     float distance;
     uint32_t track, drop;
@@ -147,66 +182,73 @@ struct Match {
 }  // namespace
 
 std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
-    const std::vector<uint32_t> piece = label_components(mesh);
-    std::vector<uint32_t> size(mesh.positions.size(), 0);
-    for (const Triangle& t : mesh.triangles) ++size[piece[t[0]]];
-    constexpr uint32_t most_triangles = 600;  // of so small a volume: beyond, it is no drop
-    std::vector<uint32_t> names, slot(mesh.positions.size(), ~0u);
-    for (uint32_t v = 0; v < size.size(); ++v)
-        if (size[v] > 0 && size[v] <= most_triangles) slot[v] = uint32_t(names.size()), names.push_back(v);
-    std::vector<std::vector<uint32_t>> triangles(names.size());
-    for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
-        if (const uint32_t s = slot[piece[mesh.triangles[t][0]]]; s != ~0u) triangles[s].push_back(t);
+    const std::vector<uint32_t> label = label_components(mesh);
     std::vector<Drop> drops, specks;
     std::vector<bool> marked(mesh.positions.size(), false);
-    const double cube = std::pow(double(edge), 3);
+    const double least_volume = least_air * std::pow(double(edge), 3);
     bool any = false;
-    for (size_t s = 0; s < names.size(); ++s) {
-        const Moments moments = moments_of(mesh, triangles[s]);
-        if (moments.facing.norm() > most_open * moments.area) continue;  // a scrap of a sheet: what volume it has means nothing
-        const float extent = extent_of(mesh, triangles[s]);
-        const bool is_small = std::abs(moments.volume) < least_air * cube, is_speck = (is_small && moments.volume < 0) || extent < 2 * least_speck * edge;
-        const auto drop = is_speck ? std::nullopt : fit_drop(mesh, triangles[s], moments, most_volume * cube, tolerance);
+    for (const Piece& piece : small_pieces(mesh, label, edge)) {
+        const double volume = piece.moments.volume;
+        const float extent = extent_of(mesh, piece.triangles);
+        const bool is_small = std::abs(volume) < least_volume, is_speck = (is_small && volume < 0) || extent < 2 * least_speck * edge;
+        const auto drop = is_speck ? std::nullopt : fit_drop(mesh, piece.triangles, piece.moments, {most_rms * tolerance, most_off * tolerance});
         if (drop) drops.push_back(*drop);
-        else if (is_speck || (is_small && extent < speck_extent * edge)) specks.push_back(speck_of(mesh, triangles[s], moments.volume));
+        else if (is_speck || (is_small && extent < speck_extent * edge)) specks.push_back(speck_of(mesh, piece.triangles, volume));
         else continue;
-        marked[names[s]] = any = true;
+        marked[piece.name] = any = true;
     }
     if (!any) return drops;
     std::vector<Triangle> others;
     for (const Triangle& t : mesh.triangles)
-        if (!marked[piece[t[0]]]) others.push_back(t);
+        if (!marked[label[t[0]]]) others.push_back(t);
     mesh = part_of(mesh, others);
     add_specks(mesh, specks, edge, tolerance, drops);
     return drops;
 }
 
-std::vector<TrackSamples> track_drops(const Window& window) {
+std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond) {
+    std::vector<Drop> drops;
+    const std::vector<Piece> pieces = small_pieces(frame.mesh, label_components(frame.mesh), frame.edge);
+    if (pieces.empty()) return drops;
+    const Mesh decoded = points.empty() ? Mesh{} : mesh_points(points, frame.edge, 1, frame.mesh.positions.size());
+    const SurfaceIndex index(decoded);
+    for (const Piece& piece : pieces) {
+        std::vector<glm::vec3> positions;
+        for (uint32_t v : vertices_of(frame.mesh, piece.triangles)) positions.push_back(frame.mesh.positions[v]);
+        if (!decoded.triangles.empty() && 2 * find_beyond(index, positions, beyond, 1).size() < positions.size()) continue;
+        const Fit any{INFINITY, INFINITY, least_speck * frame.edge};
+        if (const auto drop = fit_drop(frame.mesh, piece.triangles, piece.moments, any)) drops.push_back(*drop);
+    }
+    return drops;
+}
+
+std::vector<TrackSamples> track_drops(const Window& window, const std::vector<std::vector<Drop>>& drops_of) {
     std::vector<TrackSamples> tracks;
     std::vector<uint32_t> alive;               // tracks at the sample before
     std::vector<const Drop*> at;               // what they were there
     for (int s = 0; s < window.samples(); ++s) {
-        const SurfaceFrame& frame = *window.frames[size_t(s)];
+        const float farthest = reach * window.frames[size_t(s)]->edge;
+        const std::vector<Drop>& drops = drops_of[size_t(s)];
         const float seconds = s ? float(window.seconds[size_t(s)] - window.seconds[size_t(s - 1)]) : 0;
         std::vector<Match> matches;
         for (uint32_t a = 0; a < alive.size(); ++a)
-            for (uint32_t d = 0; d < frame.drops.size(); ++d) {
-                const Drop &from = *at[a], &to = frame.drops[d];
+            for (uint32_t d = 0; d < drops.size(); ++d) {
+                const Drop &from = *at[a], &to = drops[d];
                 const float growth = to.volume / from.volume;
                 const float off = glm::distance(from.centre + 0.5f * seconds * (from.velocity + to.velocity), to.centre);
                 const float still = glm::distance(from.centre, to.centre);
-                if (growth < most_growth && growth > 1 / most_growth && std::min(off, still) < reach * frame.edge)
+                if (growth < most_growth && growth > 1 / most_growth && std::min(off, still) < farthest)
                     matches.push_back({std::min(off, still), a, d});
             }
         std::sort(matches.begin(), matches.end(), [](const Match& a, const Match& b) {
             return a.distance != b.distance ? a.distance < b.distance : a.track != b.track ? a.track < b.track : a.drop < b.drop;
         });
-        std::vector<uint32_t> track_of(frame.drops.size(), ~0u);
+        std::vector<uint32_t> track_of(drops.size(), ~0u);
         std::vector<bool> carried(alive.size(), false);
         for (const Match& match : matches)
             if (!carried[match.track] && track_of[match.drop] == ~0u) carried[match.track] = true, track_of[match.drop] = alive[match.track];
         alive.clear(), at.clear();
-        for (uint32_t d = 0; d < frame.drops.size(); ++d) {
+        for (uint32_t d = 0; d < drops.size(); ++d) {
             if (track_of[d] == ~0u) {
                 track_of[d] = uint32_t(tracks.size());
                 TrackSamples& track = tracks.emplace_back();
@@ -215,8 +257,8 @@ std::vector<TrackSamples> track_drops(const Window& window) {
             }
             TrackSamples& track = tracks[track_of[d]];
             track.death = uint8_t(s);
-            track.position.push_back(frame.drops[d].centre), track.shape.push_back(frame.drops[d].shape);
-            alive.push_back(track_of[d]), at.push_back(&frame.drops[d]);
+            track.position.push_back(drops[d].centre), track.shape.push_back(drops[d].shape);
+            alive.push_back(track_of[d]), at.push_back(&drops[d]);
         }
     }
     for (TrackSamples& track : tracks)

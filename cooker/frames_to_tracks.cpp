@@ -270,6 +270,17 @@ std::vector<uint32_t> trim_strays(Window& window, const CodedWindow& coded, cons
     return trimmed;
 }
 
+/// Of every sample: those taken out of its mesh, and what coded points do not show.
+std::vector<std::vector<Drop>> drops_of(const Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+    std::vector<std::vector<Drop>> drops(window.frames.size());
+    parallel_for(drops.size(), goal.jobs, [&](size_t s) {
+        const SurfaceFrame& frame = *window.frames[s];
+        drops[s] = lost_drops(frame, decoded_points(coded.decoded, int(s)), repair_beyond * goal.tolerance);
+        drops[s].insert(drops[s].begin(), frame.drops.begin(), frame.drops.end());
+    });
+    return drops;
+}
+
 TrackSamples samples_of(const Window& window, const Path& path) {
     TrackSamples samples;
     samples.birth = uint8_t(path.birth), samples.death = uint8_t(path.death);
@@ -363,7 +374,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         refit_tracks(window, coded, goal, tables);
         changed.assign(window.frames.size(), true);
     }
-    for (const TrackSamples& drop : track_drops(window)) {
+    for (const TrackSamples& drop : track_drops(window, drops_of(window, coded, goal))) {
         coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));
         coded.decoded.push_back(dequantise_track(coded.tracks.back(), coded.quantiser, goal.origin, tables));
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // All stages of the cook, top to bottom, with what passes between them. One window at a time:
 //
-//   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids
+//   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids; and in the end those that points lose
 //   walls                  what lies flat in a wall goes through it: the runtime cuts it off there
 //   split_edges            long edges are halved: all that follows is measured and held at vertices
 //   frames_to_samples      where the surface decoded so far is wrong, new points are born
@@ -61,8 +61,12 @@ struct Window {
 /// Takes the closed pieces, of liquid or air, that are ellipsoids within the tolerance (metres) out of a mesh; and air too
 /// little to show, which is in no drop.
 std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance);
-/// Their tracks over the window. Those at its first and last sample go on in the windows beside it, which see the same frame.
-std::vector<TrackSamples> track_drops(const Window& window);
+/// Other small closed pieces of a frame, which its points, as decoded, do not show: most of it is more than `beyond` metres from what
+/// they do. As ellipsoids, however far those are off.
+std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond);
+/// Tracks of the drops of every sample of the window. Those at its first and last go on in the windows beside it, which see the same
+/// frame.
+std::vector<TrackSamples> track_drops(const Window& window, const std::vector<std::vector<Drop>>& drops);
 
 /// What a set of points means at the vertices of a frame.
 struct Residual {

@@ -127,3 +127,24 @@ TEST_CASE("what is torn is repaired by points that leave less off the source, th
     for (size_t i = 0; i < born.size(); ++i) CHECK(again[i].target(5).position == born[i].target(5).position);
     CHECK(repair_surface(frame, 0, {}, beyond, 1).empty());
 }
+
+TEST_CASE("thin liquid that no single point mends is mended by several at once") {
+    glm::vec3 half;  // edges
+    SUBCASE("a strand") { half = {0.6f, 0.6f, 5}; }
+    SUBCASE("a sheet") { half = {4, 4, 0.8f}; }
+    Mesh mesh = sphere(64, radius), thin = sphere(24, 1);
+    const float edge = float(median_edge(mesh));
+    const uint32_t first = uint32_t(mesh.positions.size());
+    for (const glm::vec3& x : thin.positions) mesh.positions.push_back(glm::vec3(1.5f, 0, 0) + edge * half * x);
+    for (const Triangle& t : thin.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    const SurfaceFrame frame(std::move(mesh), edge);
+    const std::vector<SurfacePoint> ball = points_of(24, radius);
+    const std::vector<Path> born = repair_surface(frame, 0, ball, 0.7f * edge, 2);
+    REQUIRE(born.size() >= 2);
+    CHECK(glm::dot(born[0].target(0).normal, born[1].target(0).normal) < -0.3f);
+    std::vector<SurfacePoint> mended = ball;
+    for (const Path& path : born) mended.push_back(path.target(0));
+    for (size_t i = ball.size(); i < mended.size(); ++i) CHECK(mended[i].position.x > 1);
+    const std::vector<uint32_t> lost = find_beyond(SurfaceIndex(mesh_points(mended, edge)), frame.mesh.positions, edge, 2);
+    CHECK(lost.size() < thin.positions.size() / 2);
+}
