@@ -55,7 +55,7 @@ static bool read_header(std::istream& in, Header& out, std::string& cause) {
             break;
         }
     }
-    cause = "not a little endian binary PLY with float x y z and triangle faces";
+    cause = "not a little endian binary PLY with float x y z and faces";
     return false;
 }
 
@@ -76,6 +76,27 @@ static void finish(Mesh& mesh) {
     }
 }
 
+/// Polygons as fans of triangles.
+static bool read_faces(const char* face, const char* end, const Header& header, Mesh& out, std::string& cause) {
+    for (size_t i = 0; i < header.faces; ++i) {
+        const size_t corners = face < end ? uint8_t(*face) : 0, bytes = 4 * corners;
+        if (face == end || bytes > size_t(end - face) - 1) {
+            cause = "ends before its last vertex or face";
+            return false;
+        }
+        uint32_t corner[255];
+        std::memcpy(corner, face + 1, bytes);
+        face += 1 + bytes;
+        for (size_t c = 0; c < corners; ++c)
+            if (corner[c] >= header.vertices) {
+                cause = "a face names a vertex that there is not";
+                return false;
+            }
+        for (size_t c = 2; c < corners; ++c) out.indices.insert(out.indices.end(), {corner[0], corner[c - 1], corner[c]});
+    }
+    return true;
+}
+
 bool read_ply(const std::string& path, Mesh& out, std::string& cause) {
     out = {};
     std::ifstream in(path, std::ios::binary);
@@ -88,10 +109,8 @@ bool read_ply(const std::string& path, Mesh& out, std::string& cause) {
     std::stringstream rest;
     rest << in.rdbuf();
     const std::string bytes = rest.str();
-    // Divisions, not products: the counts are the file's word.
-    const size_t face_bytes = 13;
-    if (header.vertices > bytes.size() / header.stride ||
-        header.faces > (bytes.size() - header.vertices * header.stride) / face_bytes) {
+    // A division, not a product: the count is the file's word.
+    if (header.vertices > bytes.size() / header.stride) {
         cause = "ends before its last vertex or face";
         return false;
     }
@@ -104,16 +123,7 @@ bool read_ply(const std::string& path, Mesh& out, std::string& cause) {
                 std::memcpy(&vector[k % 3], bytes.data() + i * header.stride + header.offset[k], 4);
             out.vertices[i].normal = glm::vec3(0.0f);
         }
-    out.indices.resize(header.faces * 3);
-    const char* face = bytes.data() + header.vertices * header.stride;
-    for (size_t i = 0; i < header.faces; ++i, face += face_bytes) {
-        std::memcpy(&out.indices[i * 3], face + 1, 12);
-        for (int c = 0; c < 3; ++c)
-            if (*face != 3 || out.indices[i * 3 + c] >= header.vertices) {
-                cause = "a face is no triangle of its vertices";
-                return false;
-            }
-    }
+    if (!read_faces(bytes.data() + header.vertices * header.stride, bytes.data() + bytes.size(), header, out, cause)) return false;
     finish(out);
     return true;
 }

@@ -19,7 +19,7 @@ struct Mesh {
     Bounds bounds;
 };
 
-/// Little endian binary PLY of triangles with float x y z and, if it has them, vx vy vz; normals are
+/// Little endian binary PLY of polygons with float x y z and, if it has them, vx vy vz; normals are
 /// the area-weighted mean of the triangles'. False: `cause` says why in one line.
 bool read_ply(const std::string& path, Mesh& out, std::string& cause);
 
