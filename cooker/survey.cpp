@@ -58,7 +58,7 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
 json vector_json(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 json to_json(const Survey& s) {
-    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls},
+    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls}, {"wall_share", s.wall_share},
             {"triangles", s.triangles}, {"vertices", s.vertices},
             {"velocity", {{"meaning", int(s.fit.meaning)}, {"factor", s.fit.factor}, {"still", s.fit.still},
                           {"as_stored", s.fit.as_stored}, {"carried", s.fit.carried}, {"conclusive", s.fit.conclusive}}}};
@@ -67,7 +67,7 @@ json to_json(const Survey& s) {
 Survey from_json(const json& j) {
     Survey s;
     for (int a = 0; a < 3; ++a) s.lower[a] = j.at("lower").at(size_t(a)), s.upper[a] = j.at("upper").at(size_t(a));
-    s.edge = j.at("edge"), s.walls = j.at("walls"), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
+    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
     const json& v = j.at("velocity");
     s.fit.meaning = VelocityMeaning(v.at("meaning").get<int>()), s.fit.factor = v.at("factor"), s.fit.still = v.at("still");
     s.fit.as_stored = v.at("as_stored"), s.fit.carried = v.at("carried"), s.fit.conclusive = v.at("conclusive");
@@ -78,7 +78,7 @@ Survey from_json(const json& j) {
 json kept_survey(const std::string& file, const std::string& states, const ReadOptions& options) {
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
-    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 2) return nullptr;
+    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 3) return nullptr;
     const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
@@ -107,6 +107,7 @@ Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<v
     for (const FrameFacts& f : facts)
         if (f.triangles > 0) walls.add(f.walls, result.edge);
     result.lower = walls.lower, result.upper = walls.upper, result.walls = walls.walls(result.edge);
+    result.wall_share = walls.share(result.walls);
     inspect(reader, facts, jobs, warn);
     return result;
 }
@@ -145,7 +146,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 2}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 3}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

@@ -16,6 +16,7 @@ struct Survey {
     glm::vec3 lower{0}, upper{0};         ///< of the surface over all frames; equal when there is none
     float edge = 1;                       ///< median edge, metres
     uint32_t walls = 0;                   ///< as format::Header
+    double wall_share = 0;                ///< of the surface of all frames: lies in them
     double triangles = 0, vertices = 0;   ///< of all frames together
     VelocityFit fit;
     std::string input;                    ///< hash of the contents of all files

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "walls.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace rill::cooker {
@@ -58,6 +59,12 @@ uint32_t WallFacts::walls(float edge) const {
         walls |= uint32_t(has_room && flat[s] > least_share * area) << s;
     }
     return walls;
+}
+
+double WallFacts::share(uint32_t walls) const {
+    double in_walls = 0;
+    for (int s = 0; s < 6; ++s) in_walls += walls >> s & 1 ? flat[s] : 0;
+    return area > 0 ? std::min(in_walls / area, 1.0) : 0;
 }
 
 void push_through_walls(Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper, uint32_t walls, float edge, float by) {

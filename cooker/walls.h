@@ -16,6 +16,8 @@ struct WallFacts {
     void add(const WallFacts& other, float edge);
     /// Sides that a share of the surface worth telling lies in, as format::Header::walls.
     uint32_t walls(float edge) const;
+    /// Of all surface, what lies in these sides.
+    double share(uint32_t walls) const;
 };
 WallFacts wall_facts(const Mesh& mesh, float edge);
 

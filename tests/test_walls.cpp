@@ -70,7 +70,10 @@ TEST_CASE("of many frames, only those count that reach the bounds of all") {
         CHECK(facts.lower.z == 0);
         CHECK(facts.upper.z == 1.5f);
         CHECK(facts.walls(edge) == 0b111111);
+        CHECK(facts.share(0b111111) == doctest::Approx(10 / 12.0).epsilon(0.03));
+        CHECK(facts.share(0b100000) == doctest::Approx(1 / 12.0).epsilon(0.1));
     }
+    CHECK(WallFacts{}.share(0b111111) == 0);
     // A drop that touches the floor once is no reason.
     WallFacts facts;
     for (int i = 0; i < 500; ++i) facts.add(facts_of(sphere(32, 1)), edge);
