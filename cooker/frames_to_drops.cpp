@@ -84,13 +84,15 @@ std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& tria
     if (axes.info() != Eigen::Success) return {};
     const double shortest = flattest * flattest * axes.eigenvalues()[2];
     if (!(axes.eigenvalues()[0] > shortest) && fit.least == 0) return {};
-    const Eigen::Vector3d half = axes.eigenvalues().cwiseMax(std::max(shortest, double(fit.least) * fit.least)).cwiseSqrt();
+    const double least = std::max(shortest, double(fit.least) * fit.least);
+    const bool is_thickened = axes.eigenvalues()[0] < least;  // then no vertex is on it
+    const Eigen::Vector3d half = axes.eigenvalues().cwiseMax(least).cwiseSqrt();
     const Eigen::Matrix3d turn = axes.eigenvectors(), inverse = turn * half.cwiseInverse().asDiagonal() * turn.transpose();
     const std::vector<uint32_t> vertices = vertices_of(mesh, triangles);
     const double share = 1 / double(vertices.size());
     const auto on_ball = [&](uint32_t v) -> Eigen::Vector3d { return inverse * (eigen(mesh.positions[v] - base) - centre); };
-    double scale = 0, square = 0;
-    for (uint32_t v : vertices) scale += share * on_ball(v).norm();
+    double scale = is_thickened, square = 0;
+    for (uint32_t v : vertices) scale += is_thickened ? 0 : share * on_ball(v).norm();
     Drop drop;
     for (uint32_t v : vertices) {
         const Eigen::Vector3d q = on_ball(v);
@@ -127,6 +129,9 @@ float extent_of(const Mesh& mesh, const std::vector<uint32_t>& triangles) {
     return std::max({upper.x - lower.x, upper.y - lower.y, upper.z - lower.z});
 }
 
+/// Half axes shorter than that are neither seen nor known to the lattice of shapes.
+float least_radius(float edge, float tolerance) { return std::max(least_speck * edge, 0.3f * tolerance); }
+
 /// Balls of liquid in the air and of air in the liquid, of a size that is seen. `around`: the mesh without them. On which side of
 /// it they lie tells what they are, not how they are wound.
 void add_specks(const Mesh& around, std::vector<Drop>& specks, float edge, float tolerance, std::vector<Drop>& drops) {
@@ -139,8 +144,7 @@ void add_specks(const Mesh& around, std::vector<Drop>& specks, float edge, float
         return glm::dot(value_at(hit, around.triangles[hit.triangle], normals), x - hit.point) >= 0;
     };
     constexpr float ball = float(4 * std::numbers::pi / 3);
-    const float least_radius = std::max(least_speck * edge, 0.3f * tolerance);  // the lattice of shapes must know it
-    const float least_volume = ball * least_radius * least_radius * least_radius, air = float(least_air) * edge * edge * edge;
+    const float least_volume = ball * std::pow(least_radius(edge, tolerance), 3.f), air = float(least_air) * edge * edge * edge;
     for (Drop& speck : specks) {
         speck.volume = is_in_air(speck.centre) ? std::max(speck.volume, least_volume) : -air;
         const float radius = std::cbrt(speck.volume / ball);
@@ -206,7 +210,7 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
     return drops;
 }
 
-std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond) {
+std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, float tolerance) {
     std::vector<Drop> drops;
     const std::vector<Piece> pieces = small_pieces(frame.mesh, label_components(frame.mesh), frame.edge);
     if (pieces.empty()) return drops;
@@ -216,7 +220,7 @@ std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<Surfac
         std::vector<glm::vec3> positions;
         for (uint32_t v : vertices_of(frame.mesh, piece.triangles)) positions.push_back(frame.mesh.positions[v]);
         if (!decoded.triangles.empty() && 2 * find_beyond(index, positions, beyond, 1).size() < positions.size()) continue;
-        const Fit any{INFINITY, INFINITY, least_speck * frame.edge};
+        const Fit any{INFINITY, INFINITY, least_radius(frame.edge, tolerance)};
         if (const auto drop = fit_drop(frame.mesh, piece.triangles, piece.moments, any)) drops.push_back(*drop);
     }
     return drops;

@@ -275,7 +275,7 @@ std::vector<std::vector<Drop>> drops_of(const Window& window, const CodedWindow&
     std::vector<std::vector<Drop>> drops(window.frames.size());
     parallel_for(drops.size(), goal.jobs, [&](size_t s) {
         const SurfaceFrame& frame = *window.frames[s];
-        drops[s] = lost_drops(frame, decoded_points(coded.decoded, int(s)), repair_beyond * goal.tolerance);
+        drops[s] = lost_drops(frame, decoded_points(coded.decoded, int(s)), repair_beyond * goal.tolerance, goal.tolerance);
         drops[s].insert(drops[s].begin(), frame.drops.begin(), frame.drops.end());
     });
     return drops;

@@ -62,8 +62,8 @@ struct Window {
 /// little to show, which is in no drop.
 std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance);
 /// Other small closed pieces of a frame, which its points, as decoded, do not show: most of it is more than `beyond` metres from what
-/// they do. As ellipsoids, however far those are off.
-std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond);
+/// they do. As ellipsoids, however far those are off, no thinner than can be coded within `tolerance` and seen.
+std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, float tolerance);
 /// Tracks of the drops of every sample of the window. Those at its first and last go on in the windows beside it, which see the same
 /// frame.
 std::vector<TrackSamples> track_drops(const Window& window, const std::vector<std::vector<Drop>>& drops);

@@ -42,7 +42,8 @@ struct OffSurface {
     float distance;
 };
 
-/// Two sides of the source close together. What is lost there is no wider than that, however far off all else is.
+/// Whether x is on the source where two of its sides are close together. What is lost there is no wider than that, however far off
+/// all else is.
 bool is_thin(const SurfaceFrame& frame, const glm::vec3& x) {
     const SurfaceIndex::Hit hit = frame.index.closest(x, thin * frame.edge);
     if (!(hit.distance < 0.01f * frame.edge)) return false;

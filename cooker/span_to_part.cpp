@@ -27,7 +27,7 @@ constexpr double least_gain = 0.4;           // of the error's logarithm per tha
 constexpr double least_hopeless = 1.4;       // times the target: where less is missing, the last attempt may still meet it
 constexpr double most_miss = 0.3;            // edges, of such liquid from the surface: velocities that carry nothing have more
 constexpr double calm_tolerance = 1.1;       // of such liquid: at the same tolerance its error is a tenth below that of other liquid
-                                             // (a third at 0.12e, but then drop_splash takes 6 % more bytes at equal p99)
+                                             // (a third at 0.12e: drop_splash takes 6 % more bytes at equal p99)
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr float longest_edge = 2.5f;         // times the median
 constexpr float through_walls = 0.2f;        // tolerances: how far liquid is cooked to go on beyond them (walls.h)
@@ -36,12 +36,12 @@ constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a sear
 /// Of the error aimed at: what an attempt begins with. Walls are exact: the more of the surface lies in them, the farther off may
 /// the rest be for the same p99; but .4 at most, or liquid ends before its walls. The finer, the more of the error is not the points'.
 double first_tolerance(double edges, double wall_share) {
-    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 1.3 : 0.2) + 0.8 * std::min(wall_share, 0.4);
+    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 0.6 : 0.2) + 0.8 * std::min(wall_share, 0.4);
 }
 /// The next attempt's, in the last one's: from how the last two errors, in the one aimed at, went with their tolerances (0: none before).
-double next_tolerance(double ratio, double tolerance, double ratio_before, double tolerance_before) {
-    const double by = std::log(tolerance / tolerance_before), did = std::log(ratio / ratio_before);
-    const double power = ratio_before > 0 && by * did > 0 ? std::clamp(by / did, 0.7, 2.0) : 0.9;
+double next_tolerance(double edges, double ratio, double tolerance, double ratio_before, double tolerance_before) {
+    const double by = std::log(tolerance / tolerance_before), did = std::log(ratio / ratio_before), usual = edges < 0.2 ? 1.3 : 0.9;
+    const double power = ratio_before > 0 && by * did > 0 ? std::clamp(by / did, 0.7, 2.0) : usual;
     return std::clamp(std::pow(1 / ratio, power), 0.3, 2.0);
 }
 
@@ -150,7 +150,8 @@ void SpanCook::run(uint32_t span, const std::string& output, const std::function
 SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
     const ChosenFrames judged(reader_, judged_frames_of(span));
     SpanResult kept;
-    double tolerance = first_tolerance(aim_.p99 / survey_.edge, survey_.wall_share) * aim_.p99, best_miss = HUGE_VAL, ratio_before = 0, tolerance_before = 0;
+    const double edges = aim_.p99 / survey_.edge;
+    double tolerance = first_tolerance(edges, survey_.wall_share) * aim_.p99, best_miss = HUGE_VAL, ratio_before = 0, tolerance_before = 0;
     for (int attempt = 1;; ++attempt) {
         SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
         result.measured = verify(candidate, judged, settings_.jobs, {}, Scrutiny::glance).totals;
@@ -161,7 +162,7 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
         if (near || attempt == most_attempts) return kept;
         if (attempt > 1 && ratio > least_hopeless && tolerance < tolerance_before &&
             std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
-        const double next = tolerance * next_tolerance(ratio, tolerance, ratio_before, tolerance_before);
+        const double next = tolerance * next_tolerance(edges, ratio, tolerance, ratio_before, tolerance_before);
         ratio_before = ratio, tolerance_before = tolerance, tolerance = next;
     }
 }

@@ -167,7 +167,7 @@ TEST_CASE("a small piece that points do not show is an ellipsoid after all, howe
     std::vector<SurfacePoint> points;
     for (size_t v = 0; v < mesh.positions.size(); ++v)
         if (glm::length(mesh.positions[v]) < 2 || mesh.positions[v].z > 2) points.push_back({frame.mesh.positions[v], frame.mesh.normals[v], {}});
-    std::vector<Drop> lost = lost_drops(frame, points, 0.5f * edge);
+    std::vector<Drop> lost = lost_drops(frame, points, 0.5f * edge, 0.1f * edge);
     REQUIRE(lost.size() == 2);
     CHECK(glm::distance(lost[0].centre, glm::vec3(3, 0, 0)) < edge);
     CHECK(lost[0].shape[0] > 1.5f * edge);
@@ -175,7 +175,8 @@ TEST_CASE("a small piece that points do not show is an ellipsoid after all, howe
     CHECK(lost[1].shape[2] == doctest::Approx(2 * edge).epsilon(0.2));
     CHECK(lost[1].shape[0] > 0.14f * edge);
     CHECK(lost[0].volume > 0);
-    CHECK(lost_drops(frame, {}, 0.5f * edge).size() == 3);
+    CHECK(lost_drops(frame, {}, 0.5f * edge, 0.1f * edge).size() == 3);
+    CHECK(lost_drops(frame, points, 0.5f * edge, edge)[1].shape[0] > 0.29f * edge);  // the lattice of shapes is as coarse
 }
 
 TEST_CASE("drops are tracked through what they meet: two cross, one comes and goes") {
