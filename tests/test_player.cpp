@@ -225,6 +225,28 @@ TEST_CASE("bad usage exits 1 and says what was wanted") {
     CHECK(run(RILL_HELLO, "").code == 1);
 }
 
+TEST_CASE("a source of polygons looks like its triangles") {
+    const auto write_plate = [](const fs::path& path, const std::vector<std::vector<uint32_t>>& faces) {
+        std::ostringstream out;
+        out << "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face "
+            << faces.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
+        const float corner[4][3] = {{-0.5f, -0.5f, 1}, {0.5f, -0.5f, 1}, {0.5f, 0.5f, 1}, {-0.5f, 0.5f, 1}};
+        out.write(reinterpret_cast<const char*>(corner), sizeof corner);
+        for (const auto& face : faces) {
+            out.put(char(face.size()));
+            out.write(reinterpret_cast<const char*>(face.data()), std::streamsize(4 * face.size()));
+        }
+        write_file(path, out.str());
+    };
+    write_plate(bench().path("quad.ply"), {{0, 1, 2, 3}});
+    write_plate(bench().path("triangles.ply"), {{0, 1, 2}, {0, 2, 3}});
+    write_plate(bench().path("half.ply"), {{0, 1, 2}});
+    for (const char* name : {"quad", "triangles", "half"})
+        REQUIRE(play("ball.rill --headless --frames 18 --size 320x180 --shading clay --source " + std::string(name) + ".ply --out " + name + ".png").code == 0);
+    CHECK(read_file(bench().path("quad.png")) == read_file(bench().path("triangles.png")));
+    CHECK(read_file(bench().path("quad.png")) != read_file(bench().path("half.png")));
+}
+
 TEST_CASE("bad source meshes are named with their cause") {
     const std::string whole = read_file(bench().folder / "frames/ball_0016.ply");
     write_file(bench().path("s0001.ply"), whole.substr(0, whole.size() - 5));
