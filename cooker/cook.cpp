@@ -139,6 +139,11 @@ nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Sur
     const SequenceInfo& info = job.reader->info();
     const double frames = double(info.numbers.size());
     nlohmann::json target = {{"p99_metres", aim.p99}};
+    nlohmann::json source = {{"format", info.format}, {"frames", info.numbers.size()}, {"first_frame", info.numbers.front()},
+                             {"frames_per_second", info.frames_per_second}, {"raw_bytes", info.raw_bytes},
+                             {"triangles_per_frame", survey.triangles / frames}, {"vertices_per_frame", survey.vertices / frames},
+                             {"median_edge_metres", survey.edge}};
+    if (survey.cut.sides) source["cut"] = cut_json(survey.cut);
     if (aim.bytes > 0) target = {{"kilobits_per_second", settings.bitrate}, {"file_bytes", aim.bytes}};
     return {{"generator", "rill cook"},
             {"tool", RILL_VERSION},
@@ -146,11 +151,7 @@ nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Sur
             {"span_count", job.plan.spans()},
             {"settings", decisive_settings(settings)},
             {"target", target},
-            {"source",
-             {{"format", info.format}, {"frames", info.numbers.size()}, {"first_frame", info.numbers.front()},
-              {"frames_per_second", info.frames_per_second}, {"raw_bytes", info.raw_bytes},
-              {"triangles_per_frame", survey.triangles / frames}, {"vertices_per_frame", survey.vertices / frames},
-              {"median_edge_metres", survey.edge}}}};
+            {"source", source}};
 }
 
 CookReport report_of(const Linked& linked, bool up_to_date) {
@@ -185,8 +186,8 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
     const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, survey.diagonal(), duration(job.reader->info()));
     const CookFacts facts = {cook_json(job, settings, survey, aim), job.reader->info().frames_per_second, uint32_t(settings.layers),
-                             survey.edge, survey.lower, survey.upper, survey.walls};
-    const auto reader = apply_fit(std::move(job.reader), survey.fit);
+                             survey.edge, survey.lower, survey.upper, survey.walls | (survey.walls & survey.cut.sides ? format::sharp_rims : 0)};
+    const auto reader = apply_fit(cut_to_closed(std::move(job.reader), survey.cut), survey.fit);
     const SpanCook spans(*reader, settings, survey, job.plan, facts, aim);
     const uint32_t begin = job.plan.first(job.share.first), end = job.plan.last(job.share.end - 1);
     std::vector<std::string> parts;

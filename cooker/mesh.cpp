@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tuple>
 
 namespace rill::cooker {
 
@@ -50,7 +51,11 @@ float median_edge(const Mesh& mesh) {
 
 double signed_volume(const Mesh& mesh) {
     if (mesh.triangles.empty()) return 0;
-    const glm::dvec3 origin = mesh.positions[mesh.triangles[0][0]];  // near the mesh: less cancellation
+    return signed_volume(mesh, mesh.positions[mesh.triangles[0][0]]);  // near the mesh: less cancellation
+}
+
+double signed_volume(const Mesh& mesh, const glm::vec3& apex) {
+    const glm::dvec3 origin = apex;
     double six_volumes = 0;
     for (const Triangle& t : mesh.triangles) {
         const glm::dvec3 a = glm::dvec3(mesh.positions[t[0]]) - origin;
@@ -59,6 +64,44 @@ double signed_volume(const Mesh& mesh) {
         six_volumes += glm::dot(a, glm::cross(b, c));
     }
     return six_volumes / 6;
+}
+
+namespace {
+/// Whether every edge is walked as often one way as the other. Sums of hashes: wrong once in 2^64 meshes, in a tenth of the time of sorting.
+bool is_closed(const Mesh& mesh) {
+    uint64_t sum = 0;
+    for (const Triangle& t : mesh.triangles)
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t a = t[k], b = t[(k + 1) % 3];
+            uint64_t hash = (uint64_t(std::min(a, b)) << 32 | std::max(a, b)) * 0x9e3779b97f4a7c15u;
+            hash = (hash ^ hash >> 32) * 0xd6e8feb86659fd93u, hash ^= hash >> 32;
+            sum += a < b ? hash : -hash;
+        }
+    return sum == 0;
+}
+}  // namespace
+
+std::vector<OpenEdge> open_edges(const Mesh& mesh) {
+    if (is_closed(mesh)) return {};
+    struct Edge {
+        uint64_t ends;
+        uint32_t triangle, corner;
+    };
+    std::vector<Edge> edges;
+    edges.reserve(3 * mesh.triangles.size());
+    for (uint32_t i = 0; i < mesh.triangles.size(); ++i)
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t a = mesh.triangles[i][k], b = mesh.triangles[i][(k + 1) % 3];
+            edges.push_back({uint64_t(std::min(a, b)) << 32 | std::max(a, b), i, k});
+        }
+    std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return std::tuple(a.ends, a.triangle, a.corner) < std::tuple(b.ends, b.triangle, b.corner); });
+    std::vector<OpenEdge> open;
+    for (size_t i = 0, next; i < edges.size(); i = next) {
+        for (next = i + 1; next < edges.size() && edges[next].ends == edges[i].ends;) ++next;
+        const Triangle& t = mesh.triangles[edges[i].triangle];
+        if (next - i == 1) open.push_back({t[edges[i].corner], t[(edges[i].corner + 1) % 3], edges[i].triangle});
+    }
+    return open;
 }
 
 std::vector<uint32_t> label_components(const Mesh& mesh) {

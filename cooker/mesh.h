@@ -36,8 +36,14 @@ std::vector<glm::vec3> vertex_normals(const Mesh& mesh);
 std::vector<float> vertex_areas(const Mesh& mesh);
 /// Median edge length over (at most 100k evenly strided) edges; 0 for an empty mesh.
 float median_edge(const Mesh& mesh);
-/// Signed volume, m³, positive for outward winding.
+/// Signed volume, m³, positive for outward winding. Of an open mesh: with cones from its open edges to `apex`.
 double signed_volume(const Mesh& mesh);
+double signed_volume(const Mesh& mesh, const glm::vec3& apex);
+/// An edge that no other triangle has, in the direction of its own.
+struct OpenEdge {
+    uint32_t from, to, triangle;
+};
+std::vector<OpenEdge> open_edges(const Mesh& mesh);
 /// Per vertex: the connected component it belongs to, named by its first vertex.
 std::vector<uint32_t> label_components(const Mesh& mesh);
 /// Takes out triangles that name a vertex twice.

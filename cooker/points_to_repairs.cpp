@@ -212,15 +212,16 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
     const bool all = place.radius > wide * frame.edge;
     std::vector<SurfacePoint> around = all ? points : points_around(frame, points, place.centre);
     double now = confusion(frame, place, around);
+    if (now >= least_gain) find_candidates(frame, place);  // else no trial could pay: three places of four at fine errors
     for (size_t taken = 0; taken < most_repairs && !place.candidates.empty();) {
         const double least = std::clamp(least_share * now, least_gain, most_gain);
+        const size_t most = std::min(most_repairs - taken, size_t(now / least));  // more could not pay
+        if (most == 0) return;
         const auto pays = [&](const Trial& trial) { return now - trial.confusion >= double(trial.taken.size()) * least; };
         std::vector<Trial> alone = with_one_more(place, {});
         Trial best = best_of(alone, frame, place, around, jobs);
-        if (!pays(best)) {
-            best = best_together(frame, place, around, most_repairs - taken, pays, jobs);
-            if (!pays(best)) return;
-        }
+        if (!pays(best) && most > 1) best = best_together(frame, place, around, most, pays, jobs);
+        if (!pays(best)) return;
         std::vector<SurfacePoint> left;
         for (size_t i = 0; i < place.candidates.size(); ++i) {
             const SurfacePoint& p = place.candidates[i];
@@ -244,7 +245,7 @@ std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const st
         const float wide_as = is_thin(frame, off.position) ? 0 : off.distance + around_void * frame.edge;
         place.centre = off.position, place.radius = std::max(least_radius * frame.edge, wide_as);
     }
-    parallel_for(places.size(), jobs, [&](size_t i) { find_probes(frame, places[i]), find_candidates(frame, places[i]); });
+    parallel_for(places.size(), jobs, [&](size_t i) { find_probes(frame, places[i]); });
     std::vector<SurfacePoint> all = points;
     for (Place& place : places) repair(frame, place, all, jobs);
     std::vector<Path> born;

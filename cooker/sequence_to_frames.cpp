@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "walls.h"
 #include "weld_seams.h"
 
 namespace rill::cooker {
@@ -70,6 +71,20 @@ std::vector<size_t> select(const SequenceInfo& info, const ReadOptions& options)
         options.warn(info.path + ": frame " + first_missing + " is missing" + (missing > 1 ? " and " + std::to_string(missing - 1) + " more" : "") +
                      ": the liquid is carried across the gap, at its true speed; bake what is missing for a better asset");
     return chosen;
+}
+
+/// Where liquid is cut off at sides of its bounds, what is missing lies in them: seen from where these meet it has no volume, and from between
+/// two of them it adds some. Waves without a floor lie above their lowest point.
+bool faces_inward(const Mesh& mesh) {
+    if (mesh.triangles.empty() || open_edges(mesh).empty()) return signed_volume(mesh) < 0;
+    const WallFacts facts = wall_facts(mesh, median_edge(mesh));
+    glm::vec3 apex;
+    for (int a = 0; a < 3; ++a) {
+        const bool lower = facts.open[2 * a] > 0, upper = facts.open[2 * a + 1] > 0;
+        const float share = lower != upper ? float(upper) : a == 2 && !lower ? 0.f : 0.5f;
+        apex[a] = facts.lower[a] + share * (facts.upper[a] - facts.lower[a]);
+    }
+    return signed_volume(mesh, apex) < 0;
 }
 
 class Frames : public SequenceReader {
@@ -147,7 +162,7 @@ void check_frame(Mesh& mesh, const std::string& name, const std::function<void(c
     drop_degenerate(mesh);
     if (const size_t closed = weld_seams(mesh); closed > 0 && warn)
         warn(name + " (" + std::to_string(closed) + " edges): vertices at the same place are taken as one");
-    if (signed_volume(mesh) < 0) {
+    if (faces_inward(mesh)) {
         for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
         for (glm::vec3& n : mesh.normals) n = -n;
         if (warn) warn(name + ": triangles face inward; turned outward");

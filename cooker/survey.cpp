@@ -31,7 +31,7 @@ FrameFacts facts_of(const Mesh& mesh) {
 }
 
 /// What will disappoint, and what to do about it.
-void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts, int jobs,
+void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts, const Cut& cut, int jobs,
              const std::function<void(const std::string&)>& warn) {
     if (!warn) return;
     std::vector<size_t> full;
@@ -39,11 +39,16 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         if (facts[i].triangles > 0) full.push_back(i);
     const size_t looks = std::min(looked_at, full.size());
     std::vector<Topology> shapes(looks);
+    std::vector<size_t> added(looks, 0);
     parallel_for(looks, jobs, [&](size_t k) {
-        const size_t i = full[full.size() * k / looks];
-        const Mesh mesh = reader.read_surface(i);
+        Mesh mesh = reader.read_surface(full[full.size() * k / looks]);
+        const size_t before = mesh.triangles.size();
+        close_at_sides(mesh, cut);
+        added[k] = mesh.triangles.size() - before;
         shapes[k] = topology(mesh);
     });
+    if (std::any_of(added.begin(), added.end(), [](size_t n) { return n > 0; }))
+        warn(reader.info().path + ": the liquid is cut off at sides of its bounds: closed there, flat");
     char text[300];
     for (size_t k = 0; k < looks; ++k) {
         const size_t i = full[full.size() * k / looks];
@@ -59,7 +64,7 @@ json vector_json(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 json to_json(const Survey& s) {
     return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls}, {"wall_share", s.wall_share},
-            {"triangles", s.triangles}, {"vertices", s.vertices},
+            {"cut", cut_json(s.cut)}, {"triangles", s.triangles}, {"vertices", s.vertices},
             {"velocity", {{"meaning", int(s.fit.meaning)}, {"factor", s.fit.factor}, {"still", s.fit.still},
                           {"as_stored", s.fit.as_stored}, {"carried", s.fit.carried}, {"conclusive", s.fit.conclusive}}}};
 }
@@ -67,7 +72,7 @@ json to_json(const Survey& s) {
 Survey from_json(const json& j) {
     Survey s;
     for (int a = 0; a < 3; ++a) s.lower[a] = j.at("lower").at(size_t(a)), s.upper[a] = j.at("upper").at(size_t(a));
-    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
+    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.cut = cut_from_json(j.at("cut")), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
     const json& v = j.at("velocity");
     s.fit.meaning = VelocityMeaning(v.at("meaning").get<int>()), s.fit.factor = v.at("factor"), s.fit.still = v.at("still");
     s.fit.as_stored = v.at("as_stored"), s.fit.carried = v.at("carried"), s.fit.conclusive = v.at("conclusive");
@@ -78,37 +83,56 @@ Survey from_json(const json& j) {
 json kept_survey(const std::string& file, const std::string& states, const ReadOptions& options) {
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
-    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 3) return nullptr;
+    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 4) return nullptr;
     const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
 
-Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<void(const std::string&)>& warn,
-                   const std::function<void(uint32_t)>& progress) {
+/// Of all frames, closed where they are cut off.
+std::vector<FrameFacts> look_at_frames(const SequenceReader& reader, const Cut& cut, int jobs, const std::function<void(uint32_t)>& progress) {
     std::vector<FrameFacts> facts(reader.info().numbers.size());
     uint32_t count = 0;
     std::mutex counting;
     parallel_for(facts.size(), jobs, [&](size_t i) {
-        facts[i] = facts_of(reader.read_surface(i));
+        Mesh mesh = reader.read_surface(i);
+        close_at_sides(mesh, cut);
+        facts[i] = facts_of(mesh);
         const std::lock_guard lock(counting);
         progress(++count);
     });
-    Survey result;
+    return facts;
+}
+
+/// 0: there is nothing to show, and nothing to measure.
+float median_of_edges(const std::vector<FrameFacts>& facts) {
     std::vector<float> edges;
-    for (const FrameFacts& f : facts) {
-        if (f.triangles == 0) continue;
-        edges.push_back(f.edge);
-        result.triangles += double(f.triangles), result.vertices += double(f.vertices);
-    }
-    if (edges.empty()) return result;  // nothing to show, and nothing to measure
+    for (const FrameFacts& f : facts)
+        if (f.triangles > 0) edges.push_back(f.edge);
+    if (edges.empty()) return 0;
     std::nth_element(edges.begin(), edges.begin() + long(edges.size() / 2), edges.end());
-    result.edge = edges[edges.size() / 2];
+    return edges[edges.size() / 2];
+}
+
+WallFacts walls_of(const std::vector<FrameFacts>& facts, float edge) {
     WallFacts walls;
     for (const FrameFacts& f : facts)
-        if (f.triangles > 0) walls.add(f.walls, result.edge);
-    result.lower = walls.lower, result.upper = walls.upper, result.walls = walls.walls(result.edge);
+        if (f.triangles > 0) walls.add(f.walls, edge);
+    return walls;
+}
+
+Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<void(const std::string&)>& warn,
+                   const std::function<void(uint32_t)>& progress) {
+    Survey result;
+    std::vector<FrameFacts> facts = look_at_frames(reader, result.cut, jobs, progress);
+    float edge = median_of_edges(facts);
+    if (edge == 0) return result;
+    result.cut = find_cut(walls_of(facts, edge), edge);
+    if (result.cut.sides) facts = look_at_frames(reader, result.cut, jobs, progress), edge = median_of_edges(facts);
+    for (const FrameFacts& f : facts) result.triangles += double(f.triangles), result.vertices += double(f.vertices);
+    const WallFacts walls = walls_of(facts, edge);
+    result.edge = edge, result.lower = walls.lower, result.upper = walls.upper, result.walls = walls.walls(edge);
     result.wall_share = walls.share(result.walls);
-    inspect(reader, facts, jobs, warn);
+    inspect(reader, facts, result.cut, jobs, warn);
     return result;
 }
 
@@ -146,7 +170,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 3}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 4}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

@@ -9,9 +9,11 @@
 #include "asset_directory.h"
 #include "asset_player.h"
 #include "check_velocity.h"
+#include "cut_to_closed.h"
 #include "parallel.h"
 
 namespace rill::cooker {
+using namespace nlohmann::literals;
 namespace {
 
 FrameMeasure measure(const Mesh& source, const Mesh& decoded, double cell) {
@@ -127,7 +129,17 @@ std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const s
         read.velocity_name = name;
         read.velocity_per_frame = setting("velocity_unit") == "frame";
     }
-    return open_sequence(input, read);
+    return closed_as_in(asset, open_sequence(input, read));
+}
+
+std::unique_ptr<SequenceReader> closed_as_in(const std::string& asset, std::unique_ptr<SequenceReader> source) {
+    const nlohmann::json stored = nlohmann::json::parse(read_directory(asset).settings_json, nullptr, false);
+    if (!stored.is_object() || !stored.contains("/source/cut"_json_pointer)) return source;
+    try {
+        return cut_to_closed(std::move(source), cut_from_json(stored.at("/source/cut"_json_pointer)));
+    } catch (const nlohmann::json::exception&) {
+        throw InputError(asset + ": its settings do not say where the source was cut off");
+    }
 }
 
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,

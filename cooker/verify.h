@@ -89,6 +89,8 @@ enum class Scrutiny {
 /// unless `read` says otherwise. Throws InputError when either
 /// cannot be read or the input lacks one.
 std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read);
+/// The frames of an input, closed where the cook of `asset` closed them. Throws InputError when the asset cannot be read.
+std::unique_ptr<SequenceReader> closed_as_in(const std::string& asset, std::unique_ptr<SequenceReader> source);
 /// Every frame of the source against the asset. Throws InputError when the asset lacks one. jobs 0: all cores.
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
                     const std::function<void(uint32_t done, uint32_t total)>& progress = {}, Scrutiny scrutiny = Scrutiny::plain);

@@ -39,15 +39,31 @@ WallFacts wall_facts(const Mesh& mesh, float edge) {
         for (int s = 0; s < 6; ++s)
             if (lies_in(mesh, t, side_of(s, facts.lower, facts.upper), flat_within * edge)) facts.flat[s] += area;
     }
+    for (const OpenEdge& e : open_edges(mesh))
+        if (const int side = side_cut_at(mesh, e, 63, facts.lower, facts.upper, edge); side >= 0) facts.open[side] += glm::distance(mesh.positions[e.from], mesh.positions[e.to]);
     return facts;
+}
+
+int side_cut_at(const Mesh& mesh, const OpenEdge& e, uint32_t sides, const glm::vec3& lower, const glm::vec3& upper, float edge) {
+    const Triangle& t = mesh.triangles[e.triangle];
+    const glm::vec3 a = mesh.positions[t[0]], normal = unit_normal(glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a));
+    float least = HUGE_VALF;
+    int found = -1;
+    for (int s = 0; s < 6; ++s) {
+        const Side side = side_of(s, lower, upper);
+        const auto off = [&](uint32_t v) { return std::fabs(mesh.positions[v][side.axis] - side.place) / (cut_within * edge); };
+        const float farther = std::max(off(e.from), off(e.to)), along = std::fabs(normal[side.axis]);
+        if ((sides >> s & 1) && farther <= 1 && farther + along < least) least = farther + along, found = s;
+    }
+    return found;
 }
 
 void WallFacts::add(const WallFacts& other, float edge) {
     for (int s = 0; s < 6; ++s) {
         const Side ours = side_of(s, lower, upper), theirs = side_of(s, other.lower, other.upper);
         const float farther = (theirs.place - ours.place) * ours.outward;
-        if (farther > flat_within * edge) flat[s] = 0;
-        if (farther >= -flat_within * edge) flat[s] += other.flat[s];
+        if (farther > flat_within * edge) flat[s] = open[s] = 0;
+        if (farther >= -flat_within * edge) flat[s] += other.flat[s], open[s] += other.open[s];
     }
     lower = glm::min(lower, other.lower), upper = glm::max(upper, other.upper), area += other.area;
 }

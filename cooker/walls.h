@@ -9,10 +9,13 @@
 
 namespace rill::cooker {
 
+constexpr float cut_within = 0.005f;  ///< edges, of the plane that liquid was cut off at
+
 /// Of one frame or of many: side 2 axis + (0 lower, 1 upper).
 struct WallFacts {
     glm::vec3 lower{1e30f}, upper{-1e30f};  ///< of what its triangles use
     double flat[6] = {}, area = 0;          ///< m² that lie flat in each side, and all there are
+    double open[6] = {};                    ///< metres of open edges that lie in each side
     void add(const WallFacts& other, float edge);
     /// Sides that a share of the surface worth telling lies in, as format::Header::walls.
     uint32_t walls(float edge) const;
@@ -20,6 +23,9 @@ struct WallFacts {
     double share(uint32_t walls) const;
 };
 WallFacts wall_facts(const Mesh& mesh, float edge);
+/// The side of a box, among `sides`, that something is missing in beyond an open edge: the edge lies in it. Along an
+/// edge of the box, the side that its triangle stands across. -1: there is none. `edge`: the mesh's median edge.
+int side_cut_at(const Mesh& mesh, const OpenEdge& e, uint32_t sides, const glm::vec3& lower, const glm::vec3& upper, float edge);
 
 /// What lies flat in a wall of the bounds goes `by` metres beyond it, and so does the edge where it ends. Bytes at equal p99, one
 /// window of `dam_break` and of `drop_splash`, and at equal mean error, against surfaces that are not cut: by 0, .15, .25, .35 and .5

@@ -160,9 +160,10 @@ int compare_command(const CompareOptions& options) {
     const FrameRange range = parse_frames(options.frames);
     ReadOptions read = options.input.checked();
     read.first = range.first, read.last = range.last, read.step = range.step;
-    const auto source = open_sequence(options.input.path, spread(read, options.input.path));
+    auto opened = open_sequence(options.input.path, spread(read, options.input.path));
     const ScratchFolder folder;
     const std::string asset = options.asset.empty() ? cook_one(options, folder) : options.asset;
+    const auto source = closed_as_in(asset, std::move(opened));
     std::vector<size_t> frames(source->info().numbers.size());
     for (size_t i = 0; i < frames.size(); ++i) frames[i] = i;
     Own own;

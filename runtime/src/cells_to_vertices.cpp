@@ -2,7 +2,8 @@
 // Surface cells → vertices: one per patch, started at the mean of its edge crossings and moved onto the
 // field by Newton steps inside its own cell. (A QEF of Hermite data would also find sharp edges; liquid
 // has few, and the blended field rounds them off anyway.) The exception are walls: a vertex whose crossings lie in walls
-// and elsewhere goes towards where they meet, by `rim_share` of the way from the mean of its crossings.
+// and elsewhere goes towards where they meet, by `rim_share` of the way from the mean of its crossings,
+// or all of it where rims are sharp.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -20,7 +21,8 @@ constexpr float cell_margin = 1 / 128.f;  // vertices keep off their cell's face
 // cooker aiming at the middle of the triangles instead, with 1, two clips: +.8 %.
 constexpr float least_slope = 1.25f;
 // Meshers that march cubes cut rims off, by less than a cell; so do these vertices, then by as much on average. p99 of a splash
-// cooked to 0.12e, in edges, with 0, .3, .5, .7 and 1: .131, .129, .136, .145, .158; mean error 0, -4, -5, -7, -10 %.
+// cooked to 0.12e, in edges, with 0, .3, .5, .7 and 1: .131, .129, .136, .145, .158; mean error 0, -4, -5, -7, -10 %. Where a source's
+// surface was cut through (cooker/cut_to_closed.h) its rims are sharp: a part of a splash .43 edges with .3, .28 with 1.
 constexpr float rim_share = 0.3f;
 
 uint32_t corner_signs(const Tile& tile, uint32_t cell) {
@@ -220,7 +222,7 @@ void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
         const float corner = float(tile_cells * tile.coord[a] + int32_t(at[a]));
         float to = k != 0 ? std::clamp(*p[a] - k * g[a], container.lower[a], container.upper[a]) : *p[a];
         if (walls >> (2 * a) & 3) to = wall_at(container, 2 * a + (walls >> (2 * a + 1) & 1));
-        if (is_rim) to = *p[a] + rim_share * (to - *p[a]);
+        if (is_rim && !m.input.sharp_rims) to = *p[a] + rim_share * (to - *p[a]);
         *p[a] = std::clamp(to, (corner + cell_margin) * size, (corner + 1 - cell_margin) * size);
     }
 }
