@@ -186,7 +186,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
     const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, survey.diagonal(), duration(job.reader->info()));
     const CookFacts facts = {cook_json(job, settings, survey, aim), job.reader->info().frames_per_second, uint32_t(settings.layers),
-                             survey.edge, survey.lower, survey.upper, survey.walls | (survey.walls & survey.cut.sides ? format::sharp_rims : 0)};
+                             survey.edge, survey.lower, survey.upper, survey.walls | (survey.walls & closed_sides(survey.cut, survey.lower, survey.upper)) << format::sharp_rims_shift};
     const auto reader = apply_fit(cut_to_closed(std::move(job.reader), survey.cut), survey.fit);
     const SpanCook spans(*reader, settings, survey, job.plan, facts, aim);
     const uint32_t begin = job.plan.first(job.share.first), end = job.plan.last(job.share.end - 1);

@@ -243,6 +243,15 @@ Cut find_cut(const WallFacts& facts, float edge) {
     return cut;
 }
 
+uint32_t closed_sides(const Cut& cut, const glm::vec3& lower, const glm::vec3& upper) {
+    uint32_t sides = 0;
+    for (int s = 0; s < 6; ++s) {
+        const float off = s & 1 ? upper[s / 2] - cut.upper[s / 2] : lower[s / 2] - cut.lower[s / 2];
+        sides |= uint32_t(cut.sides && std::fabs(off) <= cut.within()) << s;
+    }
+    return sides;
+}
+
 void close_at_sides(Mesh& mesh, const Cut& cut) {
     if (!cut.sides || mesh.triangles.empty()) return;
     mesh.normals.clear();

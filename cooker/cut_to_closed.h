@@ -20,6 +20,9 @@ struct Cut {
 /// `facts`: of all frames; `edge`: their median edge.
 Cut find_cut(const WallFacts& facts, float edge);
 
+/// Sides that a sequence of these bounds, closed there, ends in: bits as Cut::sides, those it got a floor in among them.
+uint32_t closed_sides(const Cut& cut, const glm::vec3& lower, const glm::vec3& upper);
+
 /// Closes the surface where its open edges lie in the sides of the cut, and where these are the liquid's only bound; other holes
 /// stay as they are. What is added has no velocity but that of the edges it hangs on. Liquid is on the inner side of triangles.
 void close_at_sides(Mesh& mesh, const Cut& cut);

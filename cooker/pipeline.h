@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // All stages of the cook, top to bottom, with what passes between them. One window at a time:
 //
+//   cut_to_closed          what was cut off at the sides of the domain is closed there, as the frames are read
 //   frames_to_drops        small pieces that are nearly ellipsoids become tracks of ellipsoids; and in the end those that points lose
 //   walls                  what lies flat in a wall goes through it: the runtime cuts it off there
 //   split_edges            long edges are halved: all that follows is measured and held at vertices

@@ -213,7 +213,7 @@ inline Mesh mesh(const surface::Field& field, const Setup& setup) {
         std::copy(eye.begin(), eye.begin() + 3, levels.eyes[levels.eye_count]);
         levels.reach[levels.eye_count++] = eye[3];
     }
-    begin_mesh(mesher, {&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, false, &target});
+    begin_mesh(mesher, {&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, 0, &target});
     uint32_t count;
     const Stage* stages = mesh_stages(&count);
     if (setup.workers > 1)

@@ -177,8 +177,8 @@ TEST_CASE("every rule of the directory is kept") {
     const size_t w = windows_at(good), w1 = w + window_record_bytes, c = chunks_at(good);
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     refused(good, offsetof(Header, header_bytes), 129u, "header has a wrong size");
-    refused(good, offsetof(Header, walls), sharp_rims, "walls are none of its bounds' sides");
-    refused(good, offsetof(Header, walls), 128u, "walls are none of its bounds' sides");
+    refused(good, offsetof(Header, walls), 2u | 1u << sharp_rims_shift, "walls are none of its bounds' sides");  // sharp, but no wall
+    refused(good, offsetof(Header, walls), 1u << 12, "walls are none of its bounds' sides");
     Bytes older = good;
     put(older, offsetof(Header, version), uint32_t(version_4));
     refused(older, offsetof(Header, walls), 1u, "walls are none of its bounds' sides");

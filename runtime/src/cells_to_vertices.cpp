@@ -22,7 +22,7 @@ constexpr float cell_margin = 1 / 128.f;  // vertices keep off their cell's face
 constexpr float least_slope = 1.25f;
 // Meshers that march cubes cut rims off, by less than a cell; so do these vertices, then by as much on average. p99 of a splash
 // cooked to 0.12e, in edges, with 0, .3, .5, .7 and 1: .131, .129, .136, .145, .158; mean error 0, -4, -5, -7, -10 %. Where a source's
-// surface was cut through (cooker/cut_to_closed.h) its rims are sharp: a part of a splash .43 edges with .3, .28 with 1.
+// surface was cut through (cooker/cut_to_closed.h) its rims are sharp: a part of a splash .36 edges with .3, .29 with 1.
 constexpr float rim_share = 0.3f;
 
 uint32_t corner_signs(const Tile& tile, uint32_t cell) {
@@ -215,14 +215,14 @@ void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
     if (k == 0 && !walls) return;
     const uint32_t cell = s.cell[s.slot[i]], at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     const float g[3] = {s.gx[i], s.gy[i], s.gz[i]};
-    const bool is_rim = walls && walls != met;
+    const bool is_cut_rim = walls && walls != met && !(walls & m.input.sharp_rims);
     const surface::Box& container = m.input.field->container;
     float* p[3] = {s.x + i, s.y + i, s.z + i};
     for (uint32_t a = 0; a < 3; ++a) {
         const float corner = float(tile_cells * tile.coord[a] + int32_t(at[a]));
         float to = k != 0 ? std::clamp(*p[a] - k * g[a], container.lower[a], container.upper[a]) : *p[a];
         if (walls >> (2 * a) & 3) to = wall_at(container, 2 * a + (walls >> (2 * a + 1) & 1));
-        if (is_rim && !m.input.sharp_rims) to = *p[a] + rim_share * (to - *p[a]);
+        if (is_cut_rim) to = *p[a] + rim_share * (to - *p[a]);
         *p[a] = std::clamp(to, (corner + cell_margin) * size, (corner + 1 - cell_margin) * size);
     }
 }
