@@ -18,8 +18,8 @@ namespace rill::cooker {
 namespace {
 
 constexpr float pitch_edges = 1;    // as the source: its median edge stays what it is
-constexpr float most_parts = 2048;   // of an edge of the box
-constexpr float room_edges = 10;   // a patch reaches some six edges down from the waves
+constexpr float most_parts = 2048;  // of an edge of the box
+constexpr float room_edges = 10;    // a patch reaches some six edges down from the waves
 
 /// Of a side, facing outward.
 FlatPlane plane_of(const Cut& cut, int side) {
@@ -51,7 +51,7 @@ private:
     struct Side {
         std::vector<Ring> rings;
         std::vector<std::vector<uint32_t>> arcs;  ///< vertices, from border to border
-        uint32_t whole = 0;                ///< edges of the border that are all liquid
+        uint32_t whole = 0;                       ///< edges of the border that are all liquid
     };
     /// Where an arc meets the border.
     struct End {
