@@ -24,7 +24,7 @@ Cut find_cut(const WallFacts& facts, float edge);
 uint32_t closed_sides(const Cut& cut, const glm::vec3& lower, const glm::vec3& upper);
 
 /// Closes the surface where its open edges lie in the sides of the cut, and where these are the liquid's only bound; other holes
-/// stay as they are. What is added has no velocity but that of the edges it hangs on. Liquid is on the inner side of triangles.
+/// stay as they are. New vertices are at rest. Liquid is on the inner side of triangles.
 void close_at_sides(Mesh& mesh, const Cut& cut);
 
 /// As it stands in surveys and in assets. cut_from_json() throws nlohmann::json::exception.

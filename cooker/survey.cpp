@@ -10,7 +10,6 @@
 #include "output_file.h"
 #include "parallel.h"
 #include "readers/file_bytes.h"
-#include "surface_distance.h"
 #include "walls.h"
 
 namespace rill::cooker {
@@ -38,23 +37,22 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
     for (size_t i = 0; i < facts.size(); ++i)
         if (facts[i].triangles > 0) full.push_back(i);
     const size_t looks = std::min(looked_at, full.size());
-    std::vector<Topology> shapes(looks);
-    std::vector<size_t> added(looks, 0);
+    std::vector<size_t> added(looks, 0), open(looks, 0);
     parallel_for(looks, jobs, [&](size_t k) {
         Mesh mesh = reader.read_surface(full[full.size() * k / looks]);
         const size_t before = mesh.triangles.size();
         close_at_sides(mesh, cut);
         added[k] = mesh.triangles.size() - before;
-        shapes[k] = topology(mesh);
+        open[k] = open_edges(mesh).size();
     });
     if (std::any_of(added.begin(), added.end(), [](size_t n) { return n > 0; }))
         warn(reader.info().path + ": the liquid is cut off at sides of its bounds: closed there, flat");
     char text[300];
     for (size_t k = 0; k < looks; ++k) {
         const size_t i = full[full.size() * k / looks];
-        if (shapes[k].open_edges == 0) continue;
-        std::snprintf(text, sizeof text, ": the mesh is open (%u open edges): the decoded surface is closed, so holes are covered; "
-                      "export the whole liquid, with the sides of the domain capped", shapes[k].open_edges);
+        if (open[k] == 0) continue;
+        std::snprintf(text, sizeof text, ": the mesh is open (%zu open edges): the decoded surface is closed, so holes are covered; "
+                      "export the whole liquid, with the sides of the domain capped", open[k]);
         warn(reader.name(i) + text);
         break;
     }

@@ -13,7 +13,6 @@
 #include "parallel.h"
 
 namespace rill::cooker {
-using namespace nlohmann::literals;
 namespace {
 
 FrameMeasure measure(const Mesh& source, const Mesh& decoded, double cell) {
@@ -92,6 +91,17 @@ void take(Verification& result, size_t index, FrameMeasure&& frame) {
     if (result.frames.back().distance.p99 > result.frames[result.worst].distance.p99) result.worst = index;
 }
 
+/// `stored`: the asset's settings.
+std::unique_ptr<SequenceReader> closed_as_told(const nlohmann::json& stored, const std::string& asset, std::unique_ptr<SequenceReader> source) {
+    const nlohmann::json::json_pointer place("/source/cut");
+    if (!stored.is_object() || !stored.contains(place)) return source;
+    try {
+        return cut_to_closed(std::move(source), cut_from_json(stored.at(place)));
+    } catch (const nlohmann::json::exception&) {
+        throw InputError(asset + ": its settings do not say where the source was cut off");
+    }
+}
+
 /// JSON knows no infinity.
 nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 double number(const nlohmann::json& json) { return json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>(); }
@@ -129,17 +139,11 @@ std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const s
         read.velocity_name = name;
         read.velocity_per_frame = setting("velocity_unit") == "frame";
     }
-    return closed_as_in(asset, open_sequence(input, read));
+    return closed_as_told(stored, asset, open_sequence(input, read));
 }
 
 std::unique_ptr<SequenceReader> closed_as_in(const std::string& asset, std::unique_ptr<SequenceReader> source) {
-    const nlohmann::json stored = nlohmann::json::parse(read_directory(asset).settings_json, nullptr, false);
-    if (!stored.is_object() || !stored.contains("/source/cut"_json_pointer)) return source;
-    try {
-        return cut_to_closed(std::move(source), cut_from_json(stored.at("/source/cut"_json_pointer)));
-    } catch (const nlohmann::json::exception&) {
-        throw InputError(asset + ": its settings do not say where the source was cut off");
-    }
+    return closed_as_told(nlohmann::json::parse(read_directory(asset).settings_json, nullptr, false), asset, std::move(source));
 }
 
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
