@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cook.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <set>
@@ -135,6 +137,13 @@ double duration(const SequenceInfo& info) {
 }
 
 /// What every part and the asset say of the cook.
+/// As format::Header::walls.
+uint32_t header_walls(const Survey& survey) {
+    const uint32_t sharp = survey.walls & closed_sides(survey.cut, survey.lower, survey.upper);
+    const uint32_t bevel = uint32_t(std::lround(survey.bevel / survey.edge * float(format::bevel_parts)));
+    return survey.walls | sharp << format::sharp_rims_shift | std::min(bevel, format::every_bevel) << format::bevel_shift;
+}
+
 nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Survey& survey, const Aim& aim) {
     const SequenceInfo& info = job.reader->info();
     const double frames = double(info.numbers.size());
@@ -186,7 +195,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
     const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, survey.diagonal(), duration(job.reader->info()));
     const CookFacts facts = {cook_json(job, settings, survey, aim), job.reader->info().frames_per_second, uint32_t(settings.layers),
-                             survey.edge, survey.lower, survey.upper, survey.walls | (survey.walls & closed_sides(survey.cut, survey.lower, survey.upper)) << format::sharp_rims_shift};
+                             survey.edge, survey.lower, survey.upper, header_walls(survey)};
     const auto reader = apply_fit(cut_to_closed(std::move(job.reader), survey.cut), survey.fit);
     const SpanCook spans(*reader, settings, survey, job.plan, facts, aim);
     const uint32_t begin = job.plan.first(job.share.first), end = job.plan.last(job.share.end - 1);

@@ -70,7 +70,7 @@ Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs, 
         target.vertex_capacity = vertices, target.index_capacity = uint32_t(indices.size());
         Levels levels{};
         levels.cell_size = cell;
-        begin_mesh(mesher, {&decoded.field, levels, nullptr, 0, false, 0, &target});
+        begin_mesh(mesher, {&decoded.field, levels, nullptr, 0, false, &target});
         run_stages(mesher, workers);
         if (!mesh_counts(mesher).cut || vertices == most) break;
     }

@@ -36,7 +36,8 @@ constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a sear
 /// Of the error aimed at: what an attempt begins with. Walls are exact: the more of the surface lies in them, the farther off may
 /// the rest be for the same p99; but .4 at most, or liquid ends before its walls. The finer, the more of the error is not the points'.
 double first_tolerance(double edges, double wall_share) {
-    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 0.6 : 0.2) + 0.8 * std::min(wall_share, 0.4);
+    const double finer = std::max(0.25 / edges, 1.0);
+    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 0.6 : 0.2) + 0.8 * std::pow(finer, 0.3) * std::min(wall_share, 0.4);
 }
 /// The next attempt's, in the last one's: from how the last two errors, in the one aimed at, went with their tolerances (0: none before).
 double next_tolerance(double edges, double ratio, double tolerance, double ratio_before, double tolerance_before) {
@@ -237,7 +238,7 @@ void SpanCook::load(Window& window, uint32_t last, const Past& past, float toler
         }
         Mesh mesh = reader_.read(size_t(window.first) + s);
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
-        push_through_walls(mesh, survey_.lower, survey_.upper, survey_.walls, survey_.edge, through_walls * tolerance);
+        push_through_walls(mesh, surface::container_of(&facts_.lower.x, &facts_.upper.x, facts_.walls, facts_.edge), survey_.edge, through_walls * tolerance);
         split_long_edges(mesh, longest_edge * survey_.edge);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });

@@ -17,6 +17,7 @@ namespace {
 using nlohmann::json;
 
 constexpr size_t looked_at = 6;  // frames whose topology is looked at
+constexpr size_t measured = 16;  // and whose edges between walls are
 
 struct FrameFacts {
     WallFacts walls;
@@ -29,17 +30,39 @@ FrameFacts facts_of(const Mesh& mesh) {
     return {wall_facts(mesh, edge), edge, mesh.triangles.size(), mesh.positions.size()};
 }
 
+/// Frames that the liquid is in, evenly spread.
+std::vector<size_t> samples_of(const std::vector<FrameFacts>& facts, size_t most) {
+    std::vector<size_t> full, samples;
+    for (size_t i = 0; i < facts.size(); ++i)
+        if (facts[i].triangles > 0) full.push_back(i);
+    for (size_t k = 0; k < std::min(most, full.size()); ++k) samples.push_back(full[full.size() * k / std::min(most, full.size())]);
+    return samples;
+}
+
+/// Of the edges between walls that the liquid was not cut off at.
+float measure_bevel(const SequenceReader& reader, const std::vector<FrameFacts>& facts, const Survey& survey, int jobs) {
+    const uint32_t walls = survey.walls & ~closed_sides(survey.cut, survey.lower, survey.upper);
+    const std::vector<size_t> samples = samples_of(facts, measured);
+    std::vector<std::vector<BevelFacet>> found(samples.size());
+    if (walls) parallel_for(samples.size(), jobs, [&](size_t k) {
+        Mesh mesh = reader.read_surface(samples[k]);
+        close_at_sides(mesh, survey.cut);
+        found[k] = bevel_facets(mesh, survey.lower, survey.upper, walls, survey.edge);
+    });
+    std::vector<BevelFacet> all;
+    for (const auto& facets : found) all.insert(all.end(), facets.begin(), facets.end());
+    return bevel_legs(all, survey.edge);
+}
+
 /// What will disappoint, and what to do about it.
 void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts, const Cut& cut, int jobs,
              const std::function<void(const std::string&)>& warn) {
     if (!warn) return;
-    std::vector<size_t> full;
-    for (size_t i = 0; i < facts.size(); ++i)
-        if (facts[i].triangles > 0) full.push_back(i);
-    const size_t looks = std::min(looked_at, full.size());
+    const std::vector<size_t> samples = samples_of(facts, looked_at);
+    const size_t looks = samples.size();
     std::vector<size_t> added(looks, 0), open(looks, 0);
     parallel_for(looks, jobs, [&](size_t k) {
-        Mesh mesh = reader.read_surface(full[full.size() * k / looks]);
+        Mesh mesh = reader.read_surface(samples[k]);
         const size_t before = mesh.triangles.size();
         close_at_sides(mesh, cut);
         added[k] = mesh.triangles.size() - before;
@@ -49,11 +72,10 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         warn(reader.info().path + ": the liquid is cut off at sides of its bounds: closed there, flat");
     char text[300];
     for (size_t k = 0; k < looks; ++k) {
-        const size_t i = full[full.size() * k / looks];
         if (open[k] == 0) continue;
         std::snprintf(text, sizeof text, ": the mesh is open (%zu open edges): the decoded surface is closed, so holes are covered; "
                       "export the whole liquid, with the sides of the domain capped", open[k]);
-        warn(reader.name(i) + text);
+        warn(reader.name(samples[k]) + text);
         break;
     }
 }
@@ -61,7 +83,7 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
 json vector_json(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 json to_json(const Survey& s) {
-    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls}, {"wall_share", s.wall_share},
+    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls}, {"wall_share", s.wall_share}, {"bevel", s.bevel},
             {"cut", cut_json(s.cut)}, {"triangles", s.triangles}, {"vertices", s.vertices},
             {"velocity", {{"meaning", int(s.fit.meaning)}, {"factor", s.fit.factor}, {"still", s.fit.still},
                           {"as_stored", s.fit.as_stored}, {"carried", s.fit.carried}, {"conclusive", s.fit.conclusive}}}};
@@ -70,7 +92,7 @@ json to_json(const Survey& s) {
 Survey from_json(const json& j) {
     Survey s;
     for (int a = 0; a < 3; ++a) s.lower[a] = j.at("lower").at(size_t(a)), s.upper[a] = j.at("upper").at(size_t(a));
-    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.cut = cut_from_json(j.at("cut")), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
+    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.bevel = j.at("bevel"), s.cut = cut_from_json(j.at("cut")), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
     const json& v = j.at("velocity");
     s.fit.meaning = VelocityMeaning(v.at("meaning").get<int>()), s.fit.factor = v.at("factor"), s.fit.still = v.at("still");
     s.fit.as_stored = v.at("as_stored"), s.fit.carried = v.at("carried"), s.fit.conclusive = v.at("conclusive");
@@ -81,7 +103,7 @@ Survey from_json(const json& j) {
 json kept_survey(const std::string& file, const std::string& states, const ReadOptions& options) {
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
-    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 4) return nullptr;
+    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 5) return nullptr;
     const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
@@ -130,6 +152,7 @@ Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<v
     const WallFacts walls = walls_of(facts, edge);
     result.edge = edge, result.lower = walls.lower, result.upper = walls.upper, result.walls = walls.walls(edge);
     result.wall_share = walls.share(result.walls);
+    result.bevel = measure_bevel(reader, facts, result, jobs);
     inspect(reader, facts, result.cut, jobs, warn);
     return result;
 }
@@ -168,7 +191,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 4}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 5}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

@@ -11,6 +11,11 @@ constexpr float flat_within = 0.05f;     // edges, of a side's plane
 constexpr float least_room = 2;          // edges, between two sides: a sheet has none
 constexpr double least_share = 0.01;     // of all surface: less are drops and crests that touch a bound now and then
 
+// Of bevels: the normal's share along either wall's, .7 where they are as steep to both; lengths in edges. Of five splashes of one
+// mesher 85 to 98 % of what is there is alike, of clips of them 63 and 66 %, of the rounded edges of two particle splashes 51 % and nothing.
+constexpr float least_steep = 0.6f, least_legs = 0.1f, most_legs = 2;
+constexpr float alike_within = 0.05f, least_alike = 0.6f;
+
 struct Side {
     int axis;
     float place, outward;
@@ -19,11 +24,29 @@ Side side_of(int side, const glm::vec3& lower, const glm::vec3& upper) {
     const int axis = side / 2;
     return side & 1 ? Side{axis, upper[axis], 1.f} : Side{axis, lower[axis], -1.f};
 }
+Side side_of(int side, const surface::Container& container) { return {side / 2, container.place(side), side & 1 ? 1.f : -1.f}; }
 
 bool lies_in(const Mesh& mesh, const Triangle& t, const Side& side, float within) {
     for (uint32_t v : t)
         if (!(std::fabs(mesh.positions[v][side.axis] - side.place) <= within)) return false;
     return true;
+}
+
+/// Vertices that lie in walls, or on bevels between them: bits of the walls that they are to go through.
+std::vector<uint8_t> flat_vertices(const Mesh& mesh, const surface::Container& container, float edge) {
+    std::vector<uint8_t> flat(mesh.positions.size(), 0);
+    for (int s = 0; s < 6; ++s) {
+        const Side side = side_of(s, container);
+        if (std::fabs(side.place) >= surface::unsupported) continue;
+        for (const Triangle& t : mesh.triangles)
+            if (lies_in(mesh, t, side, flat_within * edge))
+                for (uint32_t v : t) flat[v] |= uint8_t(1 << s);
+    }
+    surface::for_bevels(container, [&](const surface::Bevel& bevel) {
+        for (size_t v = 0; v < flat.size(); ++v)
+            if (bevel.value(mesh.positions[v][bevel.axis[0]], mesh.positions[v][bevel.axis[1]]) > -flat_within * edge) flat[v] |= uint8_t(1 << bevel.side[0] | 1 << bevel.side[1]);
+    });
+    return flat;
 }
 
 }  // namespace
@@ -83,16 +106,42 @@ double WallFacts::share(uint32_t walls) const {
     return area > 0 ? std::min(in_walls / area, 1.0) : 0;
 }
 
-void push_through_walls(Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper, uint32_t walls, float edge, float by) {
+std::vector<BevelFacet> bevel_facets(const Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper, uint32_t walls, float edge) {
+    std::vector<BevelFacet> facets;
+    for (const Triangle& t : mesh.triangles) {
+        const glm::vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]], middle = (a + b + c) / 3.f;
+        const glm::vec3 across = glm::cross(b - a, c - a), normal = unit_normal(across);
+        for (int low = 0; low < 4; ++low)
+            for (int high = (low / 2 + 1) * 2; high < 6; ++high) {
+                if (!(walls >> low & walls >> high & 1)) continue;
+                const Side one = side_of(low, lower, upper), other = side_of(high, lower, upper);
+                const float steep = std::min(normal[one.axis] * one.outward, normal[other.axis] * other.outward);
+                const float legs = (one.place - middle[one.axis]) * one.outward + (other.place - middle[other.axis]) * other.outward;
+                if (steep > least_steep && legs > least_legs * edge && legs < most_legs * edge) facets.push_back({legs, glm::length(across) / 2});
+            }
+    }
+    return facets;
+}
+
+float bevel_legs(std::vector<BevelFacet> facets, float edge) {
+    double all = 0, below = 0, alike = 0;
+    for (const BevelFacet& f : facets) all += f.area;
+    std::sort(facets.begin(), facets.end(), [](const BevelFacet& a, const BevelFacet& b) { return a.legs < b.legs; });
+    size_t median = 0;
+    while (median < facets.size() && (below += facets[median].area) < all / 2) ++median;
+    if (median == facets.size()) return 0;
+    for (const BevelFacet& f : facets) alike += std::fabs(f.legs - facets[median].legs) < alike_within * edge ? f.area : 0;
+    return alike > least_alike * all ? facets[median].legs : 0;
+}
+
+void push_through_walls(Mesh& mesh, const surface::Container& container, float edge, float by) {
+    const std::vector<uint8_t> flat = flat_vertices(mesh, container, edge);
     for (int s = 0; s < 6; ++s) {
-        if (!(walls >> s & 1)) continue;
-        const Side side = side_of(s, lower, upper);
-        std::vector<uint8_t> flat(mesh.positions.size(), 0);
-        for (const Triangle& t : mesh.triangles)
-            if (lies_in(mesh, t, side, flat_within * edge))
-                for (uint32_t v : t) flat[v] = 1;
-        for (size_t v = 0; v < flat.size(); ++v)
-            if (flat[v]) mesh.positions[v][side.axis] = side.place + side.outward * by;
+        const Side side = side_of(s, container);
+        for (size_t v = 0; v < flat.size(); ++v) {
+            float& x = mesh.positions[v][side.axis];
+            if (flat[v] >> s & 1) x = std::fabs(x - side.place) <= flat_within * edge ? side.place + side.outward * by : x + side.outward * by;
+        }
     }
 }
 

@@ -75,7 +75,7 @@ struct Cloud {
 struct RealField {
     surface::Field field{};
     Block memory;
-    explicit RealField(Cloud& c, const surface::Box& container = surface::everywhere) {
+    explicit RealField(Cloud& c, const surface::Container& container = surface::everywhere) {
         const format::PointSet points{uint32_t(c.activity.size()),
                                       c.p[0].data(),
                                       c.p[1].data(),
@@ -213,7 +213,7 @@ inline Mesh mesh(const surface::Field& field, const Setup& setup) {
         std::copy(eye.begin(), eye.begin() + 3, levels.eyes[levels.eye_count]);
         levels.reach[levels.eye_count++] = eye[3];
     }
-    begin_mesh(mesher, {&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, 0, &target});
+    begin_mesh(mesher, {&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, &target});
     uint32_t count;
     const Stage* stages = mesh_stages(&count);
     if (setup.workers > 1)

@@ -178,7 +178,8 @@ TEST_CASE("every rule of the directory is kept") {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     refused(good, offsetof(Header, header_bytes), 129u, "header has a wrong size");
     refused(good, offsetof(Header, walls), 2u | 1u << sharp_rims_shift, "walls are none of its bounds' sides");  // sharp, but no wall
-    refused(good, offsetof(Header, walls), 1u << 12, "walls are none of its bounds' sides");
+    refused(good, offsetof(Header, walls), 1u << bevel_shift, "walls are none of its bounds' sides");  // of no wall
+    refused(good, offsetof(Header, walls), 1u | 1u << walls_bits, "walls are none of its bounds' sides");
     Bytes older = good;
     put(older, offsetof(Header, version), uint32_t(version_4));
     refused(older, offsetof(Header, walls), 1u, "walls are none of its bounds' sides");

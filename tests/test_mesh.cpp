@@ -478,7 +478,7 @@ TEST_CASE("a hole in the points is bridged: the mesh stays closed and has no sec
 TEST_CASE("liquid is cut off at the sides of its container, exactly") {
     Cloud ball;
     add_sphere(ball, {0, 0, 0}, 1, 2000);
-    surface::Box container = surface::everywhere;
+    surface::Container container = surface::everywhere;
     container.upper[0] = 0.3f, container.lower[2] = -0.2f;
     const RealField real(ball, container);
     // Of the ball and the wall, what is nearer speaks; on the wall's other side it alone.
@@ -526,7 +526,7 @@ TEST_CASE("points that stand beyond their wall lead to it") {
                     place[size_t(axis + 1) % 3] = 0.11 * i, place[size_t(axis + 2) % 3] = 0.11 * j;
                     points.add(place, normal);
                 }
-    const surface::Box container{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
+    const surface::Container container{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
     const RealField real(points, container);
     for (const float cell : {0.1f, 0.0937f, 0.04f}) {  // walls between cells, and in them
         CAPTURE(cell);
@@ -537,5 +537,47 @@ TEST_CASE("points that stand beyond their wall lead to it") {
             for (const double x : m.at(v)) CHECK(std::fabs(x) <= 0.5 + 1e-6);
         CHECK(volume(m) == doctest::Approx(1).epsilon(0.9 * cell));
         for (const uint32_t workers : {2u, 8u}) CHECK(mesh(real.field, {cell, 200000, workers}).position == m.position);
+    }
+}
+
+TEST_CASE("edges between walls are cut off where they are not sharp") {
+    Cloud ball;
+    add_sphere(ball, {0, 0, 0}, 1, 2000);  // its surface lies outside all walls
+    constexpr float legs = 0.05f;
+    for (const uint32_t sharp : {0u, 0b000001u, 0b111111u}) {
+        const surface::Container container{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}, sharp, legs};
+        const RealField real(ball, container);
+        const bool cut = !(sharp & 1), cut_above = sharp != 0b111111u;
+        const float x[2] = {-0.49f, 0.49f}, y[2] = {0.47f, 0.47f}, z[2] = {0, 0};
+        float value[2], g[3][2];
+        std::vector<uint32_t> candidates(2000);
+        const uint32_t found = surface::gather(real.field, {{-0.5f, 0.4f, -0.1f}, {0.5f, 0.5f, 0.1f}}, candidates.data(), 2000);
+        surface::evaluate_gradient(real.field, candidates.data(), found, x, y, z, 2, value, g[0], g[1], g[2], nullptr);
+        CHECK(value[0] == doctest::Approx(cut ? 0.01 / std::sqrt(2) : -0.01).epsilon(1e-3));
+        CHECK(value[1] == doctest::Approx(cut_above ? 0.01 / std::sqrt(2) : -0.01).epsilon(1e-3));
+        CHECK(g[0][0] == doctest::Approx(cut ? -std::sqrt(0.5) : -1));
+        CHECK(g[1][0] == doctest::Approx(cut ? std::sqrt(0.5) : 0));
+        for (const float cell : {0.05f, 0.0437f, 0.0537f, 0.1f}) {  // walls between cells, and in them; bevels larger than a cell, and smaller
+            CAPTURE(sharp);
+            CAPTURE(cell);
+            const Mesh m = mesh(real.field, {cell});
+            CHECK(topology(m).closed_manifold());
+            size_t on_bevel = 0;
+            for (uint32_t v = 0; v < m.vertex_count(); ++v) {
+                const Vec at = m.at(v), n = m.normal_at(v);
+                // Far from corners, and from the sharp wall: along the edge of x+ and y+.
+                if (std::fabs(at[2]) > 0.5 - 2 * cell || at[0] < 0 || at[1] < 0) continue;
+                const double beyond = at[0] + at[1] - 1 + legs;
+                if (cut_above) CHECK(beyond < (cell > legs + 0.01f ? legs / 2 : 0) + cell / 64);  // as much is cut off, with neighbours farther away
+                if (!cut_above || beyond < -cell / 64) continue;
+                ++on_bevel;
+                CHECK(std::min(n[0], n[1]) > 0.35);
+                CHECK(n[2] == 0);
+            }
+            if (cut_above && cell < 2 * legs) CHECK(on_bevel > (1 - 4 * cell) / cell);
+            const double corner = sharp == 0 ? 12 : sharp == 1 ? 8 : 0;
+            CHECK(volume(m) == doctest::Approx(1 - corner * legs * legs / 2).epsilon(cell == 0.1f ? 0.012 : cell == 0.05f ? 0.003 : 0.0005));
+            for (const uint32_t workers : {2u, 8u}) CHECK(mesh(real.field, {cell, 200000, workers}).position == m.position);
+        }
     }
 }

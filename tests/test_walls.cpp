@@ -15,6 +15,7 @@
 #include "walls.h"
 
 using namespace rill::cooker;
+using rill::surface::Container, rill::surface::container_of;
 
 namespace {
 
@@ -37,6 +38,18 @@ Mesh tank(double seconds) {
     }
     return mesh;
 }
+/// Where two of its walls would meet it goes straight from one to the other, from `legs` metres off the edge on, as cubes marched.
+Mesh bevelled_tank(double seconds, float legs) {
+    Mesh mesh = tank(seconds);
+    for (glm::vec3& x : mesh.positions)
+        for (int a = 0; a < 2; ++a)
+            for (int b = a + 1; b < 3; ++b) {
+                if (b == 2 && x.z > 0) continue;
+                const float beyond = std::fabs(x[a]) + std::fabs(x[b]) - (b == 2 ? 1.5f : 2.f) + legs;
+                if (beyond > 0) x[a] -= std::copysign(beyond / 2, x[a]), x[b] -= std::copysign(beyond / 2, x[b]);
+            }
+    return mesh;
+}
 Mesh cube(const glm::vec3& lower, const glm::vec3& upper) {
     Mesh mesh = tank(0);
     for (glm::vec3& x : mesh.positions) x = lower + (upper - lower) * glm::clamp(2.f * x + 0.5f, glm::vec3(0), glm::vec3(1));
@@ -54,6 +67,22 @@ TEST_CASE("walls are the sides of the bounds that liquid lies flat in") {
     CHECK(walls_of(Mesh{}) == 0);
     Mesh sheet = plane(20, 1);
     CHECK(walls_of(sheet) == 0);  // both its sides are one
+}
+
+TEST_CASE("bevels are what the triangles across the edges between walls have in common") {
+    const glm::vec3 lower(-1, -1, -0.5f), upper(1, 1, 0.6f);
+    const auto legs_of = [&](const Mesh& mesh, uint32_t walls) { return bevel_legs(bevel_facets(mesh, lower, upper, walls, median_edge(mesh)), median_edge(mesh)); };
+    for (const float legs : {0.03f, 0.07f}) {
+        CAPTURE(legs);
+        const Mesh mesh = bevelled_tank(0.3, legs);
+        CHECK(legs_of(mesh, all_but_top) == doctest::Approx(legs).epsilon(0.01));
+        CHECK(legs_of(mesh, 0b011100) == doctest::Approx(legs).epsilon(0.01));
+        CHECK(legs_of(mesh, 0b000011) == 0);  // these meet nowhere
+    }
+    CHECK(legs_of(tank(0.3), all_but_top) == 0);
+    CHECK(bevel_legs({{0.03f, 1}, {0.07f, 1.2f}}, 0.07f) == 0);  // of two kinds, none is the usual
+    CHECK(bevel_legs({{0.03f, 1}, {0.07f, 2}}, 0.07f) == 0.07f);
+    CHECK(bevel_legs({}, 1) == 0);
 }
 
 TEST_CASE("of many frames, only those count that reach the bounds of all") {
@@ -85,8 +114,9 @@ TEST_CASE("of many frames, only those count that reach the bounds of all") {
 TEST_CASE("what lies flat in a wall goes through it, and nothing else moves") {
     const Mesh before = tank(0);
     const glm::vec3 lower(-1, -1, -0.5f), upper(1, 1, 0.6f);
+    const Container container = container_of(&lower.x, &upper.x, all_but_top, 1);
     Mesh mesh = before;
-    push_through_walls(mesh, lower, upper, all_but_top, median_edge(before), 0.01f);
+    push_through_walls(mesh, container, median_edge(before), 0.01f);
     size_t moved = 0;
     for (size_t v = 0; v < mesh.positions.size(); ++v)
         for (int a = 0; a < 3; ++a) {
@@ -98,7 +128,7 @@ TEST_CASE("what lies flat in a wall goes through it, and nothing else moves") {
         }
     CHECK(moved > 2000);
     Mesh ball = sphere(32, 1);
-    push_through_walls(ball, glm::vec3(-1), glm::vec3(1), 0b111111, median_edge(ball), 0.01f);
+    push_through_walls(ball, {{-1, -1, -1}, {1, 1, 1}}, median_edge(ball), 0.01f);
     CHECK(ball.positions == sphere(32, 1).positions);  // it only touches
 }
 
@@ -136,4 +166,35 @@ TEST_CASE("decoded liquid ends at its walls exactly, closed and whole in cells o
             CHECK(double(flat) > 0.85 * double(near));  // the rest is told to end before the wall, by less than the tolerance
             if (coarser == 1) CHECK(surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded)).mean < 0.1 * edge);
         }
+}
+
+TEST_CASE("edges between walls that the source cuts off are cut off so, exactly") {
+    const TestFolder folder;
+    constexpr int frames = 3;
+    constexpr float legs = 0.07f;
+    for (int i = 0; i < frames; ++i) put_file(folder / "in" + "/f" + std::to_string(1 + i) + ".ply", plain_ply(bevelled_tank(i / 24., legs)));
+    CookSettings settings;
+    settings.jobs = 2;
+    cook(folder / "in", folder / "out.rill", settings, [](const CookProgress&) {});
+    const rill::format::Header header = read_directory(folder / "out.rill").header;
+    CHECK((header.walls & rill::format::every_wall) == all_but_top);
+    CHECK(rill::format::bevel_of(header.walls, header.cell_size) == doctest::Approx(legs).epsilon(0.01));
+    AssetPlayer player(folder / "out.rill", 2);
+    const Mesh source = bevelled_tank(0, legs);
+    const float edge = median_edge(source);
+    const Mesh decoded = player.mesh(player.frame_seconds(0));
+    const Topology shape = topology(decoded);
+    CHECK(shape.open_edges == 0);
+    CHECK(shape.non_manifold_edges == 0);
+    const SurfaceIndex index(decoded);
+    size_t cut = 0, exact = 0;
+    for (const glm::vec3& x : source.positions) {
+        if (std::fabs(x.y) > 1 - 3 * edge || x.z > 0) continue;
+        if (std::fabs(x.x) + std::fabs(x.z) - 1.5f + legs < -edge / 100) continue;
+        const float off = index.closest(x, INFINITY).distance;
+        ++cut, exact += off < 0.02f * edge;
+        CHECK(off < 0.3f * edge);  // edges that are sharp are .67 off
+    }
+    CHECK(cut > 60);
+    CHECK(double(exact) > 0.7 * double(cut));
 }

@@ -87,6 +87,7 @@ nlohmann::json describe(const std::string& path) {
             {"lower", {h.lower[0], h.lower[1], h.lower[2]}},
             {"upper", {h.upper[0], h.upper[1], h.upper[2]}},
             {"walls", walls},
+            {"bevel_m", format::bevel_of(h.walls, h.cell_size)},
             {"points_per_window", points},
             {"drop_tracks", drops},
             {"most_blocks", blocks},
@@ -145,7 +146,9 @@ void print(const nlohmann::json& info) {
                 info["upper"][2].get<double>(), number("median_edge_m"));
     std::printf("walls       ");
     for (const nlohmann::json& wall : info["walls"]) std::printf(" %s", wall.get<std::string>().c_str());
-    std::printf(info["walls"].empty() ? " none\n" : "\n");
+    if (info["walls"].empty()) std::printf(" none");
+    if (number("bevel_m") > 0) std::printf(", edges between them cut off %.4g m from them", number("bevel_m"));
+    std::printf("\n");
     std::printf("layers\n");
     for (size_t i = 0; i < info["layers"].size(); ++i) {
         const nlohmann::json& layer = info["layers"][i];

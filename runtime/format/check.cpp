@@ -58,7 +58,9 @@ void read_header(Cursor& cursor, Header& h) {
 
 const char* header_fault(const Header& h, uint64_t file_bytes) {
     if (h.header_bytes != header_bytes) return "header has a wrong size";
-    if (h.walls >> sharp_rims_shift & ~(h.walls & every_wall) || (h.version == version_4 && h.walls != 0)) return "walls are none of its bounds' sides";
+    const uint32_t walls = h.walls & every_wall, sharp = h.walls >> sharp_rims_shift & every_wall;
+    if (sharp & ~walls || (h.walls != 0 && walls == 0) || h.walls >> walls_bits || (h.version == version_4 && h.walls != 0))
+        return "walls are none of its bounds' sides";
     if (h.file_bytes > file_bytes) return "file is shorter than its header says";
     if (h.file_bytes < file_bytes) return "file is longer than its header says";
     if (h.directory_bytes > max_directory_bytes || h.directory_bytes > file_bytes - header_bytes)

@@ -53,7 +53,7 @@ struct Header {
     double first_seconds;       ///< source's clock at frame 0
     float lower[3];             ///< bounds of the source over all frames; equal to upper if empty
     float upper[3];
-    uint32_t walls;             ///< bit 2 axis + (0 lower, 1 upper): the liquid is cut off at that side of its bounds; and sharp rims. Version 4: 0
+    uint32_t walls;             ///< bit 2 axis + (0 lower, 1 upper): the liquid is cut off at that side of its bounds; and as follows. Version 4: 0
     uint32_t header_crc;        ///< CRC-32 of the 124 bytes before it
 };
 inline constexpr uint32_t header_bytes = 128;
@@ -61,6 +61,9 @@ inline constexpr uint32_t every_wall = 63;
 /// So many bits above that of a wall: the surface goes on to it as it is, and ends at an edge. Where that is 0, as meshers of cubes
 /// have it: cut off within a cell.
 inline constexpr uint32_t sharp_rims_shift = 6;
+/// Edges between walls that are not sharp are cut off by a plane, so many 128ths of a cell from the edge along either wall: 8 bits.
+inline constexpr uint32_t bevel_shift = 12, every_bevel = 255, bevel_parts = 128, walls_bits = 20;
+inline float bevel_of(uint32_t walls, float cell_size) { return float(walls >> bevel_shift & every_bevel) / bevel_parts * cell_size; }
 static_assert(sizeof(Header) == header_bytes, "the struct is the byte layout");
 
 /// One span of time, decodable alone: frames first_sample … first_sample + sample_count − 1.

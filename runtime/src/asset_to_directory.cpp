@@ -105,10 +105,7 @@ void average_errors(Directory& d) {
 
 void describe(Directory& d) {
     const format::Header& h = d.header;
-    for (uint32_t a = 0; a < 3; ++a) {
-        d.container.lower[a] = h.walls >> (2 * a) & 1 ? h.lower[a] : -surface::unsupported;
-        d.container.upper[a] = h.walls >> (2 * a + 1) & 1 ? h.upper[a] : surface::unsupported;
-    }
+    d.container = surface::container_of(h.lower, h.upper, h.walls, h.cell_size);
     AssetInfo& info = d.info;
     info.seconds = frame_time(d, h.frame_count - 1);
     info.first_seconds = h.first_seconds;

@@ -152,9 +152,11 @@ void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
 }
 
 /// Whether no wall comes near the tile.
-bool is_inside(const surface::Box& container, const Tile& tile) {
+bool is_inside(const surface::Container& container, const Tile& tile) {
+    const float reach = surface::bevel_reach(container);
     bool inside = true;
-    for (uint32_t a = 0; a < 3; ++a) inside = inside && corner_at(tile, a, 0) > container.lower[a] && corner_at(tile, a, tile_cells) < container.upper[a];
+    for (uint32_t a = 0; a < 3; ++a)
+        inside = inside && corner_at(tile, a, 0) > container.lower[a] + reach && corner_at(tile, a, tile_cells) < container.upper[a] - reach;
     return inside;
 }
 

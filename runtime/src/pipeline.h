@@ -39,7 +39,7 @@ struct Directory {
     format::DirectoryTables tables;      ///< settings: zero-terminated
     format::BasisTables basis;
     AssetInfo info;
-    surface::Box container;              ///< sides of the bounds that the liquid is cut off at; far away where it is not
+    surface::Container container;        ///< sides of the bounds that the liquid is cut off at
     float layer_error[format::max_layers];  ///< mean over the clip, with this and all coarser layers; falls
     uint32_t most_point_tracks, most_drop_tracks, most_chunks;  ///< of any one window
     uint64_t suggested_resident_bytes;

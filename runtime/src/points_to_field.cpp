@@ -32,7 +32,6 @@ uint32_t prepare_mesh(void* context) {
     input.views = player.plan.view_count ? player.plan.views : nullptr;
     input.view_count = player.plan.view_count;
     input.velocity = target->velocity.data != nullptr;
-    input.sharp_rims = player.directory->header.walls >> format::sharp_rims_shift;
     input.target = target;
     if (player.frame.budget.cell_size == 0) {  // else that size is an order
         input.most_octaves = std::max(0.f, most_octaves(*player.directory) - player.pace.octaves);

@@ -258,7 +258,7 @@ size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
 }
 
 void begin_field(Field& field, void* memory, const format::PointSet& points, const format::DropSet& drops,
-                 const Box& container) noexcept {
+                 const Container& container) noexcept {
     field = {};
     field.kernels = &best_kernels();
     field.container = container;

@@ -15,6 +15,7 @@
 #include <cstdint>
 
 #include "format/tracks.h"
+#include "surface/container.h"
 
 namespace rill::surface {
 
@@ -22,10 +23,6 @@ namespace rill::surface {
 struct Box {
     float lower[3], upper[3];
 };
-/// The value of what reaches nothing; and a box without sides.
-inline constexpr float unsupported = 1e30f;
-inline constexpr Box everywhere{{-unsupported, -unsupported, -unsupported}, {unsupported, unsupported, unsupported}};
-
 /// Each sixteen neighbours in the sorted order as one, row by row and padded to whole sixteens: bundle k holds points
 /// or smaller bundles [16 k, 16 k + 16).
 struct Bundles {
@@ -62,7 +59,7 @@ struct Field {
     float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
     Bundles bundles, groups;               ///< of points; of bundles
     float spacing;                         ///< about the distance of points
-    Box container = everywhere;            ///< as given to begin_field()
+    Container container = everywhere;           ///< as given to begin_field()
     const Kernels* kernels;                ///< what evaluation runs on
     float largest_support;
 };
@@ -73,7 +70,7 @@ size_t field_bytes(uint32_t points, uint32_t drops) noexcept;
 /// Step 1, one thread: sorts the points inside `memory`. Non-finite points are dropped. O(n log n).
 /// `container`: where the liquid ends, exactly, wherever it would go on by its points and drops.
 void begin_field(Field& field, void* memory, const format::PointSet& points, const format::DropSet& drops,
-                 const Box& container = everywhere) noexcept;
+                 const Container& container = everywhere) noexcept;
 /// Step 2, any threads, disjoint ranges [first, last) of sorted points: supports and quadratics.
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
 /// Step 3, one thread: bundles, largest support.

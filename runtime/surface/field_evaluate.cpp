@@ -64,6 +64,20 @@ void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const
         }
 }
 
+/// Edges between walls are cut off, by a plane that is as steep to either.
+void cut_at_bevels(const Container& container, const float* const position[3], uint32_t n, const Results& out) {
+    float* const gradient[3] = {out.gx, out.gy, out.gz};
+    for_bevels(container, [&](const Bevel& bevel) {
+        for (uint32_t i = 0; i < n; ++i) {
+            const float value = bevel.value(position[bevel.axis[0]][i], position[bevel.axis[1]][i]);
+            if (!(value > out.value[i])) continue;
+            out.value[i] = value;
+            for (int a = 0; a < 3 && out.gx; ++a) gradient[a][i] = 0;
+            for (int k = 0; k < 2 && out.gx; ++k) gradient[bevel.axis[k]][i] = bevel.outward[k];
+        }
+    });
+}
+
 /// Beyond a wall there is air, and along it the liquid ends: the intersection with the container.
 void cut_at_walls(const Field& f, const float* const position[3], uint32_t n, const Results& out) {
     float* const gradient[3] = {out.gx, out.gy, out.gz};
@@ -76,6 +90,7 @@ void cut_at_walls(const Field& f, const float* const position[3], uint32_t n, co
                     for (int b = 0; b < 3; ++b) gradient[b][i] = b == a ? outward : 0;
             for (uint32_t i = 0; i < n; ++i) out.value[i] = std::max(out.value[i], outward * (position[a][i] - wall));
         }
+    cut_at_bevels(f.container, position, n, out);
 }
 
 /// The first position fills unused lanes: no branch in the kernels.

@@ -29,7 +29,6 @@ struct MeshInput {
     const FrustumPlanes* views;   ///< none: everything
     uint32_t view_count;
     bool velocity;                ///< wanted in the output
-    uint32_t sharp_rims;          ///< of the field's container: bits of the walls that the surface meets at an edge
     Target* target;               ///< may be null: mesh but write nothing
     /// What does not fit is meshed again with larger cells, up to so many octaves, before anything is cut off.
     float most_octaves = 0;
