@@ -514,8 +514,8 @@ TEST_CASE("liquid is cut off at the sides of its container, exactly") {
     }
 }
 
-TEST_CASE("points that stand beyond their wall lead to it") {
-    constexpr double beyond = 0.03;  // most of the smallest cell
+/// The sides of a cube of one metre, moved outward.
+Cloud cube_of_points(double beyond) {
     Cloud points;
     for (int axis = 0; axis < 3; ++axis)
         for (const double side : {-1., 1.})
@@ -526,6 +526,12 @@ TEST_CASE("points that stand beyond their wall lead to it") {
                     place[size_t(axis + 1) % 3] = 0.11 * i, place[size_t(axis + 2) % 3] = 0.11 * j;
                     points.add(place, normal);
                 }
+    return points;
+}
+
+TEST_CASE("points that stand beyond their wall lead to it") {
+    constexpr double beyond = 0.03;  // most of the smallest cell
+    Cloud points = cube_of_points(beyond);
     const surface::Container container{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
     const RealField real(points, container);
     for (const float cell : {0.1f, 0.0937f, 0.04f}) {  // walls between cells, and in them
@@ -537,6 +543,26 @@ TEST_CASE("points that stand beyond their wall lead to it") {
             for (const double x : m.at(v)) CHECK(std::fabs(x) <= 0.5 + 1e-6);
         CHECK(volume(m) == doctest::Approx(1).epsilon(0.9 * cell));
         for (const uint32_t workers : {2u, 8u}) CHECK(mesh(real.field, {cell, 200000, workers}).position == m.position);
+    }
+}
+
+TEST_CASE("liquid that ends a hair before its wall ends at it, and at the same angle") {
+    constexpr float cell = 0.1f;
+    const surface::Container container{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
+    for (const double before : {0.01, 0.1}) {  // cells
+        CAPTURE(before);
+        Cloud points = cube_of_points(-before * cell);
+        const RealField real(points, container);
+        const Mesh m = mesh(real.field, {0.0937f});
+        CHECK(topology(m).closed_manifold());
+        size_t middle = 0, flat = 0;
+        for (uint32_t v = 0; v < m.vertex_count(); ++v) {
+            const Vec at = m.at(v), n = m.normal_at(v);
+            if (at[0] < 0.4 || std::max(std::fabs(at[1]), std::fabs(at[2])) > 0.25) continue;
+            ++middle, flat += at[0] == 0.5 && n[0] == 1;
+        }
+        CHECK(middle > 10);
+        CHECK(flat == (before < 0.03 ? middle : 0));
     }
 }
 

@@ -29,6 +29,9 @@ constexpr float rim_share = 0.3f;
 // cooked to 0.12e, in edges, with 0, .15 and .5: .113, .108, - and .125, .124, .128; without bevels .132 and .134. With no vertices
 // put on the lines where bevels end: p99 the same, mean error +6 %; with the bevel's normal alone on these lines 2.20 degrees, not 1.85.
 constexpr float nearly = 0.15f;
+// Liquid that ends no farther before a wall, in cells, and with a normal whose share along the wall's is as large, ends at it: a degree
+// that a wall's normals are off bends all that is seen through it. Mean error of four splashes with .02 to .05: the same, with .1 +1 to +5 %.
+constexpr float before_wall = 0.03f, along_wall = 0.99f;
 
 uint32_t corner_signs(const Tile& tile, uint32_t cell) {
     const uint32_t x = cell % 8, row = cell / 8 % 8 + 9 * (cell / 64);
@@ -123,8 +126,8 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
 
 /// Of what a patch meets: a surface that is no wall.
 constexpr uint32_t meets_free = 1u << 6;
-/// Or that may lie where an edge between walls is cut off.
-constexpr uint32_t nears_bevel = 1u << 7;
+/// Or that is near to walls.
+constexpr uint32_t nears_wall = 1u << 7;
 
 /// Of the walls, those that run through a box of so many cells, from there on in cells of the tile.
 uint32_t walls_in(const Mesher& m, const Tile& tile, uint32_t walls, const float (&first)[3], float cells) {
@@ -136,7 +139,7 @@ uint32_t walls_in(const Mesher& m, const Tile& tile, uint32_t walls, const float
     return found;
 }
 uint32_t walls_in(const Mesher& m, const Tile& tile) {
-    const float reach = surface::bevel_reach(m.input.field->container) / tile.cell;
+    const float reach = std::max(surface::bevel_reach(m.input.field->container) / tile.cell, before_wall);
     float first[3];
     for (uint32_t a = 0; a < 3; ++a) first[a] = float(tile_cells * tile.coord[a]) - reach;
     return walls_in(m, tile, meets_free - 1, first, tile_cells + 2 * reach);
@@ -191,7 +194,7 @@ void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
             *out[a] = (corner[a] + inside) * tile.cell;
         }
         s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(p);
-        s.meets[n] = uint8_t(walls ? meets(m, tile, walls, patches, p, value, corner) | nears_bevel : meets_free);
+        s.meets[n] = uint8_t(walls ? meets(m, tile, walls, patches, p, value, corner) | nears_wall : meets_free);
     }
 }
 
@@ -264,7 +267,7 @@ bool step_to_bevel(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
 
 /// One step onto the field and the walls that are met, inside the cell. `i`: place in the batch.
 void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
-    const uint32_t met = s.meets[s.slot[i]] & ~nears_bevel, walls = met & (meets_free - 1);
+    const uint32_t met = s.meets[s.slot[i]] & ~nears_wall, walls = met & (meets_free - 1);
     const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = tile.cell;
     float k = s.value[i] / std::max(g2, least_slope * least_slope);
     if (!(met & meets_free) || !(k * k * g2 < size * size)) k = 0;  // farther than a cell, or no field: stay
@@ -283,9 +286,24 @@ void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
     }
 }
 
+/// Onto a wall that the liquid ends a little before, along it: its points ended before it.
+void snap_to_wall(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
+    const uint32_t cell = s.cell[s.slot[i]], corner[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    float* p[3] = {s.x + i, s.y + i, s.z + i};
+    const float g[3] = {s.gx[i], s.gy[i], s.gz[i]}, length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    for (uint32_t side = 0; side < 6; ++side) {
+        const uint32_t a = side / 2;
+        const float outward = side & 1 ? 1.f : -1.f, wall = m.input.field->container.place(int(side)), low = float(tile_cells * tile.coord[a] + int32_t(corner[a]));
+        if (!(outward * (*p[a] - wall) > -before_wall * tile.cell && outward * g[a] > along_wall * length)) continue;
+        *p[a] = std::clamp(wall, (low + cell_margin) * tile.cell, (low + 1 - cell_margin) * tile.cell);
+        s.meets[s.slot[i]] = uint8_t(1u << side);
+        return;
+    }
+}
+
 /// The normal of a patch: of what it meets, each as much. False where there is none.
 bool find_normal(const MesherScratch& s, uint32_t i, float (&normal)[3]) {
-    const uint32_t met = s.meets[s.slot[i]] & ~nears_bevel;
+    const uint32_t met = s.meets[s.slot[i]] & ~nears_wall;
     if (met & meets_free) {
         normal[0] = s.gx[i], normal[1] = s.gy[i], normal[2] = s.gz[i];
         if (!(normalise(normal) && std::abs(s.value[i]) < surface::unsupported)) return false;
@@ -335,8 +353,9 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
             const uint32_t slot = s.slot[i];
             Vertex vertex{};
             float(&normal)[3] = vertex.normal;
-            if (!(s.meets[slot] & nears_bevel && step_to_bevel(m, s, tile, i, normal))) {
+            if (!(s.meets[slot] & nears_wall && step_to_bevel(m, s, tile, i, normal))) {
                 step(m, s, tile, i);
+                if (s.meets[slot] == (meets_free | nears_wall)) snap_to_wall(m, s, tile, i);
                 if (!find_normal(s, i, normal)) guess_normal(m, tile, s.cell[slot], s.patch[slot], normal);
             }
             vertex.position[0] = s.x[i], vertex.position[1] = s.y[i], vertex.position[2] = s.z[i];

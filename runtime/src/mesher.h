@@ -83,7 +83,7 @@ struct MesherScratch {
     // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
     uint8_t patch[capacity];
-    uint8_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, meets_free and nears_bevel
+    uint8_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, meets_free and nears_wall
     uint16_t vertex[cells_per_tile];
     CellPattern pattern[cells_per_tile];
     ParentCells parents;
