@@ -42,12 +42,13 @@ std::vector<size_t> samples_of(const std::vector<FrameFacts>& facts, size_t most
 /// Of the edges between walls that the liquid was not cut off at.
 float measure_bevel(const SequenceReader& reader, const std::vector<FrameFacts>& facts, const Survey& survey, int jobs) {
     const uint32_t walls = survey.walls & ~closed_sides(survey.cut, survey.lower, survey.upper);
+    const surface::Container container = surface::container_of(&survey.lower.x, &survey.upper.x, walls, survey.edge);
     const std::vector<size_t> samples = samples_of(facts, measured);
     std::vector<std::vector<BevelFacet>> found(samples.size());
     if (walls) parallel_for(samples.size(), jobs, [&](size_t k) {
         Mesh mesh = reader.read_surface(samples[k]);
         close_at_sides(mesh, survey.cut);
-        found[k] = bevel_facets(mesh, survey.lower, survey.upper, walls, survey.edge);
+        found[k] = bevel_facets(mesh, container, survey.edge);
     });
     std::vector<BevelFacet> all;
     for (const auto& facets : found) all.insert(all.end(), facets.begin(), facets.end());

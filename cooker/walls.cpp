@@ -106,19 +106,18 @@ double WallFacts::share(uint32_t walls) const {
     return area > 0 ? std::min(in_walls / area, 1.0) : 0;
 }
 
-std::vector<BevelFacet> bevel_facets(const Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper, uint32_t walls, float edge) {
+std::vector<BevelFacet> bevel_facets(const Mesh& mesh, surface::Container container, float edge) {
+    container.bevel = most_legs * edge;
     std::vector<BevelFacet> facets;
     for (const Triangle& t : mesh.triangles) {
         const glm::vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]], middle = (a + b + c) / 3.f;
         const glm::vec3 across = glm::cross(b - a, c - a), normal = unit_normal(across);
-        for (int low = 0; low < 4; ++low)
-            for (int high = (low / 2 + 1) * 2; high < 6; ++high) {
-                if (!(walls >> low & walls >> high & 1)) continue;
-                const Side one = side_of(low, lower, upper), other = side_of(high, lower, upper);
-                const float steep = std::min(normal[one.axis] * one.outward, normal[other.axis] * other.outward);
-                const float legs = (one.place - middle[one.axis]) * one.outward + (other.place - middle[other.axis]) * other.outward;
-                if (steep > least_steep && legs > least_legs * edge && legs < most_legs * edge) facets.push_back({legs, glm::length(across) / 2});
-            }
+        surface::for_bevels(container, [&](const surface::Bevel& bevel) {
+            const int x = bevel.axis[0], y = bevel.axis[1];
+            const float steep = std::min(std::copysign(normal[x], normal[x] * bevel.outward[0]), std::copysign(normal[y], normal[y] * bevel.outward[1]));
+            const float legs = bevel.legs - std::sqrt(2.f) * bevel.value(middle[x], middle[y]);
+            if (steep > least_steep && legs > least_legs * edge && legs < most_legs * edge) facets.push_back({legs, glm::length(across) / 2});
+        });
     }
     return facets;
 }

@@ -29,8 +29,8 @@ struct BevelFacet {
     float legs;  ///< metres from the edge, along either wall
     float area;
 };
-/// Those that are near to an edge between walls of these bounds. `walls`: those whose edges are looked at.
-std::vector<BevelFacet> bevel_facets(const Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper, uint32_t walls, float edge);
+/// Those that are near to an edge between walls that are not sharp, whatever its bevel.
+std::vector<BevelFacet> bevel_facets(const Mesh& mesh, surface::Container container, float edge);
 /// What most of them have in common: metres. 0: nothing, or there are none.
 float bevel_legs(std::vector<BevelFacet> facets, float edge);
 /// The side of a box, among `sides`, that something is missing in beyond an open edge: the edge lies in it. Along an

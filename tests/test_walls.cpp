@@ -71,7 +71,7 @@ TEST_CASE("walls are the sides of the bounds that liquid lies flat in") {
 
 TEST_CASE("bevels are what the triangles across the edges between walls have in common") {
     const glm::vec3 lower(-1, -1, -0.5f), upper(1, 1, 0.6f);
-    const auto legs_of = [&](const Mesh& mesh, uint32_t walls) { return bevel_legs(bevel_facets(mesh, lower, upper, walls, median_edge(mesh)), median_edge(mesh)); };
+    const auto legs_of = [&](const Mesh& mesh, uint32_t walls) { return bevel_legs(bevel_facets(mesh, container_of(&lower.x, &upper.x, walls, 1), median_edge(mesh)), median_edge(mesh)); };
     for (const float legs : {0.03f, 0.07f}) {
         CAPTURE(legs);
         const Mesh mesh = bevelled_tank(0.3, legs);

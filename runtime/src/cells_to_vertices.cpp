@@ -216,17 +216,30 @@ void guess_normal(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t pat
     if (!normalise(normal)) normal[0] = normal[1] = 0, normal[2] = 1;
 }
 
-/// A vertex on a bevel.
+/// The box of a cell.
+struct CellBox {
+    float size, corner[3];  ///< metres; in cells
+    CellBox(const Tile& tile, uint32_t cell) : size(tile.cell) {
+        const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
+        for (uint32_t a = 0; a < 3; ++a) corner[a] = float(tile_cells * tile.coord[a] + int32_t(at[a]));
+    }
+    float low(uint32_t a) const { return corner[a] * size; }
+    float high(uint32_t a) const { return (corner[a] + 1) * size; }
+    /// Off its faces.
+    float clamp(uint32_t a, float place) const { return std::clamp(place, (corner[a] + cell_margin) * size, (corner[a] + 1 - cell_margin) * size); }
+};
+
+/// A vertex on a bevel. `normal`: of any length.
 struct BevelPlace {
     float at[3], normal[3];
 };
 
 /// Moves `place.at` to the bevel's part that is in the cell: to the end at one of its walls, if just one is. With both, to where the
 /// mesh, with its neighbours a cell farther, cuts as much off as the bevel does. False where no part is.
-bool place_on(const surface::Bevel& bevel, const float (&low)[3], const float (&high)[3], BevelPlace& place) {
+bool place_on(const surface::Bevel& bevel, const CellBox& box, BevelPlace& place) {
     float first = 0, last = 1, along = 0;  // of the way from its end at one wall to that at the other
     for (int k = 0; k < 2; ++k) {
-        const float from = bevel.end(0, k), way = bevel.end(1, k) - from, to_low = (low[bevel.axis[k]] - from) / way, to_high = (high[bevel.axis[k]] - from) / way;
+        const float from = bevel.end(0, k), way = bevel.end(1, k) - from, to_low = (box.low(uint32_t(bevel.axis[k])) - from) / way, to_high = (box.high(uint32_t(bevel.axis[k])) - from) / way;
         first = std::max(first, std::min(to_low, to_high)), last = std::min(last, std::max(to_low, to_high));
         along += (place.at[bevel.axis[k]] - from) / way / 2;
     }
@@ -234,7 +247,7 @@ bool place_on(const surface::Bevel& bevel, const float (&low)[3], const float (&
     const bool is_end = (first == 0) != (last == 1), is_all = first == 0 && last == 1;
     const int end = last == 1;
     along = is_end ? float(end) : std::clamp(along, first, last);
-    const float off = bevel.legs * bevel.legs / (2 * (high[0] - low[0]));
+    const float off = bevel.legs * bevel.legs / (2 * box.size);
     std::fill(place.normal, place.normal + 3, 0.f);
     for (int k = 0; k < 2; ++k) {
         place.at[bevel.axis[k]] = is_all ? bevel.wall[k] - std::copysign(off, bevel.outward[k]) : bevel.end(0, k) + along * (bevel.end(1, k) - bevel.end(0, k));
@@ -247,20 +260,19 @@ bool place_on(const surface::Bevel& bevel, const float (&low)[3], const float (&
 /// Onto a bevel in the cell, where the liquid goes on to it, or nearly. False where none does.
 bool step_to_bevel(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i, float (&normal)[3]) {
     const float size = tile.cell, from[3] = {s.x[i], s.y[i], s.z[i]}, gradient[3] = {s.gx[i], s.gy[i], s.gz[i]};
-    const uint32_t cell = s.cell[s.slot[i]], corner[3] = {cell % 8, cell / 8 % 8, cell / 64};
-    float low[3], high[3], nearest = HUGE_VALF;
-    for (uint32_t a = 0; a < 3; ++a) low[a] = float(tile_cells * tile.coord[a] + int32_t(corner[a])) * size, high[a] = low[a] + size;
+    const CellBox box(tile, s.cell[s.slot[i]]);
+    float nearest = HUGE_VALF;
     BevelPlace best{};
     surface::for_bevels(m.input.field->container, [&](const surface::Bevel& bevel) {
         BevelPlace place{{from[0], from[1], from[2]}, {}};
-        if (!place_on(bevel, low, high, place)) return;
+        if (!place_on(bevel, box, place)) return;
         float value = s.value[i], distance2 = 0;
         for (uint32_t a = 0; a < 3; ++a) value += gradient[a] * (place.at[a] - from[a]), distance2 += (place.at[a] - from[a]) * (place.at[a] - from[a]);
         if (value < nearly * size && distance2 < nearest) nearest = distance2, best = place;
     });
     if (nearest == HUGE_VALF) return false;
     float* p[3] = {s.x + i, s.y + i, s.z + i};
-    for (uint32_t a = 0; a < 3; ++a) *p[a] = std::clamp(best.at[a], low[a] + cell_margin * size, high[a] - cell_margin * size);
+    for (uint32_t a = 0; a < 3; ++a) *p[a] = box.clamp(a, best.at[a]);
     std::copy(best.normal, best.normal + 3, normal);
     return normalise(normal);
 }
@@ -272,30 +284,29 @@ void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
     float k = s.value[i] / std::max(g2, least_slope * least_slope);
     if (!(met & meets_free) || !(k * k * g2 < size * size)) k = 0;  // farther than a cell, or no field: stay
     if (k == 0 && !walls) return;
-    const uint32_t cell = s.cell[s.slot[i]], at[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    const CellBox box(tile, s.cell[s.slot[i]]);
     const float g[3] = {s.gx[i], s.gy[i], s.gz[i]};
     const bool is_cut_rim = walls && walls != met && !(walls & m.input.field->container.sharp);
     const surface::Container& container = m.input.field->container;
     float* p[3] = {s.x + i, s.y + i, s.z + i};
     for (uint32_t a = 0; a < 3; ++a) {
-        const float corner = float(tile_cells * tile.coord[a] + int32_t(at[a]));
         float to = k != 0 ? std::clamp(*p[a] - k * g[a], container.lower[a], container.upper[a]) : *p[a];
         if (walls >> (2 * a) & 3) to = container.place(int(2 * a + (walls >> (2 * a + 1) & 1)));
         if (is_cut_rim) to = *p[a] + rim_share * (to - *p[a]);
-        *p[a] = std::clamp(to, (corner + cell_margin) * size, (corner + 1 - cell_margin) * size);
+        *p[a] = box.clamp(a, to);
     }
 }
 
 /// Onto a wall that the liquid ends a little before, along it: its points ended before it.
 void snap_to_wall(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
-    const uint32_t cell = s.cell[s.slot[i]], corner[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    const CellBox box(tile, s.cell[s.slot[i]]);
     float* p[3] = {s.x + i, s.y + i, s.z + i};
     const float g[3] = {s.gx[i], s.gy[i], s.gz[i]}, length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     for (uint32_t side = 0; side < 6; ++side) {
         const uint32_t a = side / 2;
-        const float outward = side & 1 ? 1.f : -1.f, wall = m.input.field->container.place(int(side)), low = float(tile_cells * tile.coord[a] + int32_t(corner[a]));
+        const float outward = side & 1 ? 1.f : -1.f, wall = m.input.field->container.place(int(side));
         if (!(outward * (*p[a] - wall) > -before_wall * tile.cell && outward * g[a] > along_wall * length)) continue;
-        *p[a] = std::clamp(wall, (low + cell_margin) * tile.cell, (low + 1 - cell_margin) * tile.cell);
+        *p[a] = box.clamp(a, wall);
         s.meets[s.slot[i]] = uint8_t(1u << side);
         return;
     }
