@@ -126,8 +126,10 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
 
 /// Of what a patch meets: a surface that is no wall.
 constexpr uint32_t meets_free = 1u << 6;
-/// Or that is near to walls.
-constexpr uint32_t nears_wall = 1u << 7;
+/// Or that is near to walls; to two of them.
+constexpr uint32_t nears_wall = 1u << 7, nears_edge = 1u << 8;
+/// As far as that, in cells.
+float near_walls(const Mesher& m, const Tile& tile) { return std::max(m.input.field->container.bevel / tile.cell, before_wall); }
 
 /// Of the walls, those that run through a box of so many cells, from there on in cells of the tile.
 uint32_t walls_in(const Mesher& m, const Tile& tile, uint32_t walls, const float (&first)[3], float cells) {
@@ -139,13 +141,21 @@ uint32_t walls_in(const Mesher& m, const Tile& tile, uint32_t walls, const float
     return found;
 }
 uint32_t walls_in(const Mesher& m, const Tile& tile) {
-    const float reach = std::max(surface::bevel_reach(m.input.field->container) / tile.cell, before_wall);
+    const float reach = near_walls(m, tile);
     float first[3];
     for (uint32_t a = 0; a < 3; ++a) first[a] = float(tile_cells * tile.coord[a]) - reach;
     return walls_in(m, tile, meets_free - 1, first, tile_cells + 2 * reach);
 }
 
-/// What the crossings of a patch lie in. `corner`: the cell's, in cells.
+/// What a cell is near to. `corner`: its own, in cells.
+uint32_t nears(const Mesher& m, const Tile& tile, uint32_t tile_walls, const float (&corner)[3]) {
+    if (!tile_walls) return 0;
+    const float reach = near_walls(m, tile), first[3] = {corner[0] - reach, corner[1] - reach, corner[2] - reach};
+    const uint32_t walls = walls_in(m, tile, tile_walls, first, 1 + 2 * reach);
+    return !walls ? 0 : walls & (walls - 1) ? nears_wall | nears_edge : nears_wall;
+}
+
+/// What the crossings of a patch lie in.
 uint32_t meets(const Mesher& m, const Tile& tile, uint32_t tile_walls, const CellPatches& patches, uint32_t patch, const float* value, const float (&corner)[3]) {
     constexpr float same = 1e-3f;  // cells
     const uint32_t walls = walls_in(m, tile, tile_walls, corner, 1);
@@ -186,6 +196,7 @@ void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
     const uint32_t at[3] = {cell % 8, cell / 8 % 8, cell / 64};
     float corner[3];
     for (uint32_t a = 0; a < 3; ++a) corner[a] = float(tile_cells * tile.coord[a] + int32_t(at[a]));
+    const uint32_t near = nears(m, tile, walls, corner);
     for (uint32_t p = 0; p < std::max<uint32_t>(patches.count, 1); ++p, ++n) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};
         const float share = 1 / sum[p][3];
@@ -194,7 +205,7 @@ void place_patches(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
             *out[a] = (corner[a] + inside) * tile.cell;
         }
         s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(p);
-        s.meets[n] = uint8_t(walls ? meets(m, tile, walls, patches, p, value, corner) | nears_wall : meets_free);
+        s.meets[n] = uint16_t(near ? meets(m, tile, walls, patches, p, value, corner) | near : meets_free);
     }
 }
 
@@ -279,7 +290,7 @@ bool step_to_bevel(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t
 
 /// One step onto the field and the walls that are met, inside the cell. `i`: place in the batch.
 void step(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) {
-    const uint32_t met = s.meets[s.slot[i]] & ~nears_wall, walls = met & (meets_free - 1);
+    const uint32_t met = s.meets[s.slot[i]] & ~(nears_wall | nears_edge), walls = met & (meets_free - 1);
     const float g2 = s.gx[i] * s.gx[i] + s.gy[i] * s.gy[i] + s.gz[i] * s.gz[i], size = tile.cell;
     float k = s.value[i] / std::max(g2, least_slope * least_slope);
     if (!(met & meets_free) || !(k * k * g2 < size * size)) k = 0;  // farther than a cell, or no field: stay
@@ -307,14 +318,14 @@ void snap_to_wall(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
         const float outward = side & 1 ? 1.f : -1.f, wall = m.input.field->container.place(int(side));
         if (!(outward * (*p[a] - wall) > -before_wall * tile.cell && outward * g[a] > along_wall * length)) continue;
         *p[a] = box.clamp(a, wall);
-        s.meets[s.slot[i]] = uint8_t(1u << side);
+        s.meets[s.slot[i]] = uint16_t(1u << side);
         return;
     }
 }
 
 /// The normal of a patch: of what it meets, each as much. False where there is none.
 bool find_normal(const MesherScratch& s, uint32_t i, float (&normal)[3]) {
-    const uint32_t met = s.meets[s.slot[i]] & ~nears_wall;
+    const uint32_t met = s.meets[s.slot[i]] & ~(nears_wall | nears_edge);
     if (met & meets_free) {
         normal[0] = s.gx[i], normal[1] = s.gy[i], normal[2] = s.gz[i];
         if (!(normalise(normal) && std::abs(s.value[i]) < surface::unsupported)) return false;
@@ -345,10 +356,11 @@ struct Output {
         if (morphs) move_to_parent(s, *drawn, cell, v);
         const uint32_t vertex = drawn->first_vertex + i;
         std::memcpy(m.position + 3 * size_t(vertex), v.position, sizeof(v.position));
+        std::memcpy(m.normal + 3 * size_t(vertex), v.normal, sizeof(v.normal));
+        m.of_field[vertex] = v.of_field;
         cover(*drawn, v.position);
         if (!m.input.target) return;
         write3(m.input.target->position, vertex, v.position);
-        write3(m.input.target->normal, vertex, v.normal);
         if (is_moving(m)) write3(m.input.target->velocity, vertex, v.velocity);
     }
 };
@@ -364,11 +376,13 @@ void finish_batch(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t 
             const uint32_t slot = s.slot[i];
             Vertex vertex{};
             float(&normal)[3] = vertex.normal;
-            if (!(s.meets[slot] & nears_wall && step_to_bevel(m, s, tile, i, normal))) {
+            const bool on_bevel = s.meets[slot] & nears_edge && step_to_bevel(m, s, tile, i, normal);
+            if (!on_bevel) {
                 step(m, s, tile, i);
-                if (s.meets[slot] == (meets_free | nears_wall)) snap_to_wall(m, s, tile, i);
+                if ((s.meets[slot] & ~nears_edge) == (meets_free | nears_wall)) snap_to_wall(m, s, tile, i);
                 if (!find_normal(s, i, normal)) guess_normal(m, tile, s.cell[slot], s.patch[slot], normal);
             }
+            vertex.of_field = !on_bevel && s.meets[slot] & meets_free;
             vertex.position[0] = s.x[i], vertex.position[1] = s.y[i], vertex.position[2] = s.z[i];
             for (uint32_t a = 0; a < 3 && velocity; ++a) vertex.velocity[a] = velocity[i - first + a * batch];
             output.write(s, begin + slot, s.cell[slot], vertex);

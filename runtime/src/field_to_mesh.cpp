@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The mesher's memory and its table of stages. march.cpp finds the surface cells, drop_specks.cpp
-// clears noise from them, cells_to_vertices.cpp places their vertices, mesh_to_buffers.cpp joins them to
-// triangles in the caller's buffers.
+// clears noise from them, cells_to_vertices.cpp places their vertices, vertices_to_normals.cpp gives these their
+// normals, mesh_to_buffers.cpp joins them to triangles in the caller's buffers.
 #include "surface/field_to_mesh.h"
 
 #include <algorithm>
@@ -48,6 +48,8 @@ size_t carve(void* memory, const MeshLimits& limits, Mesher& m) {
     m.next_active = carver.take<uint32_t>(limits.tiles);
     m.order = carver.take<OrderedTile>(limits.tiles);
     m.position = carver.take<float>(3 * size_t(limits.vertices));
+    m.normal = carver.take<float>(3 * size_t(limits.vertices));
+    m.of_field = carver.take<uint8_t>(limits.vertices);
     m.scratch = carver.take<MesherScratch>(limits.workers);
     return carver.used;
 }
@@ -110,6 +112,7 @@ constexpr Stage phases[] = {
     {prepare_counts, run_counts, false},
     {prepare_layout, nullptr, false},
     {prepare_vertices, run_vertices, false},
+    {prepare_normals, run_normals, false},
     {prepare_quads, run_quads, false},
     {prepare_ranges, nullptr, false},
 };

@@ -62,6 +62,7 @@ inline uint8_t surface_cells(const Tile& tile, uint32_t row) {
 /// A vertex on its way to the target.
 struct Vertex {
     float position[3], normal[3], velocity[3];
+    bool of_field;               ///< the normal
 };
 
 /// Cells twice as large in the place of a tile's own, towards which its vertices move: see cells_to_parents.cpp.
@@ -83,7 +84,7 @@ struct MesherScratch {
     // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
     uint8_t patch[capacity];
-    uint8_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, meets_free and nears_wall
+    uint16_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, meets_free, nears_wall, nears_edge
     uint16_t vertex[cells_per_tile];
     CellPattern pattern[cells_per_tile];
     ParentCells parents;
@@ -133,6 +134,8 @@ struct Mesher {
     OrderedTile* order;
     uint32_t order_count, kept;  ///< tiles with surface; how many of them are drawn
     float* position;             ///< 3 per vertex, as written to the target
+    float* normal;               ///< 3 per vertex, of what it lies on
+    uint8_t* of_field;           ///< per vertex: its normal is the gradient, not that of walls
     MesherScratch* scratch;      ///< one per worker
 };
 
@@ -190,6 +193,10 @@ uint32_t prepare_counts(void* mesher);
 void run_counts(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_vertices(void* mesher);
 void run_vertices(void* mesher, uint32_t task, uint32_t worker);
+
+// vertices_to_normals.cpp
+uint32_t prepare_normals(void* mesher);
+void run_normals(void* mesher, uint32_t task, uint32_t worker);
 
 // mixed_edges.cpp
 /// A tile with neighbours of another size: counts the indices of its polygons, or writes them (null: only covers).
