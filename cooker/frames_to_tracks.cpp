@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "parallel.h"
+#include "points_to_mesh.h"
+#include "walls.h"
 
 namespace rill::cooker {
 namespace {
@@ -18,6 +20,12 @@ constexpr float stray_beyond = 1.5f;  // at an end of a life
 constexpr int trimmings = 3;
 constexpr int most_rounds = 8;    // of births at one frame
 constexpr float credible = 3;                      // tolerances a correction may be told to mend
+// Cells and points cut off what is convex, and the patches of thin liquid sag: it comes out short of volume, which the distance at
+// vertices does not tell. So what is aimed at goes as far outside the source as volume is missing, frame by frame, by so many tolerances
+// at most. Mean volume of pour_sphere .9985 → 1.0000, its violent frames .994 … .997 → .996 … 1.0005, a flat ball .96 → 1.00; bytes at equal
+// p99 of eight clips from two solvers −3.6 … +.5, on average −.9 %.
+constexpr float most_offset = 0.15f;
+constexpr float few_points = 200;  // of as many, half is taken for chance: how each is rounded
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
 
@@ -170,9 +178,18 @@ Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, in
     return sweep;
 }
 
+/// How far the decoded surface lies inside the source's, by what volume is missing: metres.
+float depth_of(const SurfaceFrame& frame, const Mesh& decoded, const surface::Container& container) {
+    double area = 0;
+    for (size_t v = 0; v < frame.area.size(); ++v)
+        if (is_inside(frame.mesh.positions[v], container)) area += frame.area[v];
+    return area > 0 ? float((volume_inside(frame.mesh, container) - volume_inside(decoded, container)) / area) : 0;
+}
+
 /// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
 /// `changed`: the samples to look at (others have been found whole, or beyond mending); afterwards those with a new path.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std::vector<bool>& changed) {
+/// `depth`: of the samples looked at, of the surface as it was.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std::vector<bool>& changed, std::vector<float>& depth) {
     const size_t first = window.paths.size();
     const auto grown_at = [&](int s) {
         return std::any_of(window.paths.begin() + ptrdiff_t(first), window.paths.end(), [&](const Path& path) { return path.alive(s); });
@@ -184,20 +201,24 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std:
             thin_out(window, s, goal, mended_at(window, coded, first, s), first);
         }
         if (!changed[size_t(s)] && !grown_at(s)) continue;
+        const SurfaceFrame& frame = *window.frames[size_t(s)];
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
-        for (Path& path : repair_surface(*window.frames[size_t(s)], s, points, repair_beyond * goal.tolerance, goal.jobs))
+        const Mesh decoded = mesh_points(points, frame.edge, goal.jobs, frame.mesh.positions.size());
+        depth[size_t(s)] = depth_of(frame, decoded, goal.container) * float(points.size()) / (float(points.size()) + few_points);
+        for (Path& path : repair_surface(frame, s, points, decoded, repair_beyond * goal.tolerance, goal.jobs))
             window.paths.push_back(std::move(path));
     }
     for (int s = 0; s < window.samples(); ++s) changed[size_t(s)] = grown_at(s);
 }
 
 /// Corrections in all frames, against what the tracks decode to.
-void correct_window(Window& window, const CodedWindow& coded, const WindowGoal& goal) {
+void correct_window(Window& window, const CodedWindow& coded, const WindowGoal& goal, const std::vector<float>& offset) {
     parallel_for(window.frames.size(), goal.jobs, [&](size_t s) {
         const SurfaceFrame& frame = *window.frames[s];
         std::vector<uint32_t> ids;
         const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), &ids);
-        const Residual residual = measure_residual(frame, points);
+        Residual residual = measure_residual(frame, points);
+        aim_outside(frame, goal.container, offset[s], residual.distance);
         correct_paths(frame, residual, points, ids, int(s), credible * goal.tolerance, window.paths);
     });
 }
@@ -320,6 +341,11 @@ float project(const Window& window, const Path& path, int sample, const glm::vec
 
 }  // namespace
 
+void aim_outside(const SurfaceFrame& frame, const surface::Container& container, float offset, std::vector<float>& distance) {
+    for (size_t v = 0; v < distance.size(); ++v)
+        if (is_inside(frame.mesh.positions[v], container)) distance[v] += offset;
+}
+
 void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal) {
     window.paths = survivors;
     for (int s = 0; s < window.samples(); ++s) {
@@ -356,22 +382,30 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     code_from(0);
     const size_t grown = window.paths.size();
     std::vector<bool> changed(window.frames.size(), true);
-    mend(window, coded, goal, changed);
+    std::vector<float> depth(window.frames.size(), 0.f), offset = depth;
+    // What is aimed at goes as far outside the source as the surface came to lie inside it.
+    const auto lift = [&] {
+        const float most = most_offset * goal.tolerance;
+        for (size_t s = 0; s < offset.size(); ++s) offset[s] = std::clamp(offset[s] + depth[s], -most, most);
+    };
+    mend(window, coded, goal, changed, depth);
+    lift();
     code_from(grown);
     drop_fleeting(window, coded, goal);
-    correct_window(window, coded, goal);
+    correct_window(window, coded, goal, offset);
     code_from(0);
-    refit_tracks(window, coded, goal, tables);
+    refit_tracks(window, coded, goal, tables, offset);
     for (int round = 0; round < trimmings; ++round) code(trim_strays(window, coded, goal));
     // What was left out may have torn a tip or a rim, and now and then a correction spoils a frame; and births tear, too.
     changed.assign(window.frames.size(), true);
     for (int round = 0; round < last_mendings; ++round) {
         const size_t mended = window.paths.size();
-        mend(window, coded, goal, changed);
+        mend(window, coded, goal, changed, depth);
         code_from(mended);
         if (round > 0) continue;
+        lift();
         // Births change what is around them; and whatever this tears is mended by the next round.
-        refit_tracks(window, coded, goal, tables);
+        refit_tracks(window, coded, goal, tables, offset);
         changed.assign(window.frames.size(), true);
     }
     for (const TrackSamples& drop : track_drops(window, drops_of(window, coded, goal))) {

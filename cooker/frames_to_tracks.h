@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pipeline.h"
+#include "surface/container.h"
 
 namespace rill::cooker {
 
@@ -12,6 +13,7 @@ struct WindowGoal {
     float tolerance = 0;          ///< metres: births where the decoded surface misses the source by more
     Quantiser quantiser{};
     glm::vec3 origin{};
+    surface::Container container = surface::everywhere;  ///< what the runtime will cut the surface off at
     int jobs = 0;
 };
 struct CodedWindow {
@@ -25,8 +27,11 @@ struct CodedWindow {
 void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal);
 /// Quantises the tracks and corrects them against what they decode to.
 CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables);
+/// Adds to the distances of vertices (Residual) what makes `offset` metres outside the source the aim. Walls stay where they are.
+void aim_outside(const SurfaceFrame& frame, const surface::Container& container, float offset, std::vector<float>& distance);
 /// Chooses the coefficients of all tracks anew, so that together they decode to the least error for their bits.
-void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
+/// `offset`: metres outside the source that are aimed at, by sample.
+void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset);
 /// Those that reach the last sample, as one-sample paths: what the next window continues.
 std::vector<Path> survivors_of(const Window& window);
 /// Decoded points at a sample; `ids`: the tracks they belong to; `only`: of those.

@@ -96,9 +96,10 @@ double residual_percentile(const SurfaceFrame& frame, const Residual& residual, 
 /// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to.
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
                                         float threshold, float tolerance);
-/// Paths born at a sample where the decoded mesh of the points and the source are more than `beyond` metres apart, in either
+/// Paths born at a sample where what the points decode to (mesh_points()) and the source are more than `beyond` metres apart, in either
 /// direction: those that, by trial, leave the decoded surface better there.
-std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs);
+std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
+                                 float beyond, int jobs);
 
 /// Carries the point to the next frame by the motion of the vertices of this one; empty where the surface leaves it.
 std::optional<SurfacePoint> carry_point(const SurfaceFrame& from, const std::vector<glm::vec3>& motion, const SurfaceFrame& to,

@@ -234,10 +234,11 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
 
 }  // namespace
 
-std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs) {
+std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
+                                 float beyond, int jobs) {
     if (points.empty() || frame.mesh.triangles.empty()) return {};
     std::vector<Place> places;
-    for (const OffSurface& off : find_off(frame, mesh_points(points, frame.edge, jobs, frame.mesh.positions.size()), beyond, jobs)) {
+    for (const OffSurface& off : find_off(frame, decoded, beyond, jobs)) {
         const auto near = [&](const Place& p) { return glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(places.begin(), places.end(), near)) continue;
         if (places.size() > points.size() / points_per_place) break;

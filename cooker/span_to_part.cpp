@@ -206,7 +206,8 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
         Window window = next_window(first, end, past, float(tolerance));
         window.opens_span = first == begin;
         const uint32_t last = first + uint32_t(window.samples()) - 1;
-        const WindowGoal goal = goal_for(tolerance * (window.calm ? calm_tolerance : 1), survey_, settings_.jobs);
+        WindowGoal goal = goal_for(tolerance * (window.calm ? calm_tolerance : 1), survey_, settings_.jobs);
+        goal.container = container();
         grow_tracks(window, survivors, goal);
         const CodedWindow coded = code_tracks(window, goal, tables_);
         write_window(writer, first - begin, window, coded, goal, uint32_t(settings_.layers), last == end, result);
@@ -238,7 +239,7 @@ void SpanCook::load(Window& window, uint32_t last, const Past& past, float toler
         }
         Mesh mesh = reader_.read(size_t(window.first) + s);
         std::vector<Drop> drops = take_drops(mesh, survey_.edge, tolerance);
-        push_through_walls(mesh, surface::container_of(&facts_.lower.x, &facts_.upper.x, facts_.walls, facts_.edge), survey_.edge, through_walls * tolerance);
+        push_through_walls(mesh, container(), survey_.edge, through_walls * tolerance);
         split_long_edges(mesh, longest_edge * survey_.edge);
         window.frames[s] = std::make_shared<SurfaceFrame>(std::move(mesh), survey_.edge, std::move(drops));
     });

@@ -11,6 +11,7 @@
 #include "format/fourier_extension.h"
 #include "parts_to_asset.h"
 #include "pipeline.h"
+#include "surface/container.h"
 #include "survey.h"
 
 namespace rill::cooker {
@@ -39,6 +40,7 @@ private:
     /// Evenly spread, as many of every span, so that spans weigh what they are; the border frame is the next span's.
     std::vector<size_t> judged_frames_of(uint32_t span) const;
     SpanResult cook(uint32_t span, const std::string& output, double tolerance, const std::function<void(uint32_t)>& done) const;
+    surface::Container container() const { return surface::container_of(&facts_.lower.x, &facts_.upper.x, facts_.walls, facts_.edge); }
     void write(AssetWriter& writer, const SpanResult& result) const;
     /// From `first` on, and how its points go: longer where the liquid is calm.
     Window next_window(uint32_t first, uint32_t span_end, const Past& past, float tolerance) const;

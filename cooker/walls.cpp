@@ -144,4 +144,23 @@ void push_through_walls(Mesh& mesh, const surface::Container& container, float e
     }
 }
 
+bool is_inside(const glm::vec3& x, const surface::Container& container) {
+    bool inside = true;
+    for (int a = 0; a < 3; ++a) inside = inside && x[a] > container.lower[a] && x[a] < container.upper[a];
+    surface::for_bevels(container, [&](const surface::Bevel& bevel) { inside = inside && bevel.value(x[bevel.axis[0]], x[bevel.axis[1]]) < 0; });
+    return inside;
+}
+
+double volume_inside(Mesh mesh, const surface::Container& container) {
+    // Drawn onto the container, what lies beyond has no volume any more.
+    for (glm::vec3& x : mesh.positions) {
+        x = glm::clamp(x, glm::vec3(container.lower[0], container.lower[1], container.lower[2]), glm::vec3(container.upper[0], container.upper[1], container.upper[2]));
+        surface::for_bevels(container, [&](const surface::Bevel& bevel) {
+            const float beyond = bevel.value(x[bevel.axis[0]], x[bevel.axis[1]]);
+            for (int k = 0; k < 2 && beyond > 0; ++k) x[bevel.axis[k]] -= beyond * bevel.outward[k];
+        });
+    }
+    return signed_volume(mesh);
+}
+
 }  // namespace rill::cooker

@@ -41,5 +41,9 @@ int side_cut_at(const Mesh& mesh, const OpenEdge& e, uint32_t sides, const glm::
 /// window of `dam_break` and of `drop_splash`, and at equal mean error, against surfaces that are not cut: by 0, .15, .25, .35 and .5
 /// tolerances −2.1, −2.2, −1.9, −1.3, +.8 and −1.1, −1.6, −.7, −2.3, −.4 %; −9, −18, −19, −19, −19 and −8, −15, −15, −17, −16 %.
 void push_through_walls(Mesh& mesh, const surface::Container& container, float edge, float by);
+/// Nothing that is cut off, nor the cut.
+bool is_inside(const glm::vec3& x, const surface::Container& container);
+/// Of what a closed mesh encloses, as much as lies in the container: m³.
+double volume_inside(Mesh mesh, const surface::Container& container);
 
 }  // namespace rill::cooker

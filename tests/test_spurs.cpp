@@ -29,6 +29,10 @@ SurfaceFrame frame_of_ball() {
 }
 size_t count(const std::vector<uint8_t>& flags) { return size_t(std::count(flags.begin(), flags.end(), 1)); }
 
+std::vector<Path> repaired(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, float beyond, int jobs) {
+    return repair_surface(frame, sample, points, mesh_points(points, frame.edge), beyond, jobs);
+}
+
 }  // namespace
 
 TEST_CASE("points mesh to the closed surface they mean, the same with any number of threads") {
@@ -98,7 +102,7 @@ TEST_CASE("what is torn is repaired by points that leave less off the source, th
     const SurfaceFrame frame = frame_of_ball();
     const std::vector<SurfacePoint> whole = points_of(24, radius);
     const float beyond = 0.7f * frame.edge;
-    CHECK(repair_surface(frame, 0, whole, beyond, 2).empty());
+    CHECK(repaired(frame, 0, whole, beyond, 2).empty());
 
     // The ball is cut flat there; the second void is farther from the source than a few edges.
     float rim = 0.4f;
@@ -112,7 +116,7 @@ TEST_CASE("what is torn is repaired by points that leave less off the source, th
         return surface_distance(frame.mesh, frame.index, decoded, SurfaceIndex(decoded)).max;
     };
     REQUIRE(farthest(torn) > beyond);
-    const std::vector<Path> born = repair_surface(frame, 5, torn, beyond, 1);
+    const std::vector<Path> born = repaired(frame, 5, torn, beyond, 1);
     REQUIRE(!born.empty());
     std::vector<SurfacePoint> mended = torn;
     for (const Path& path : born) {
@@ -122,10 +126,10 @@ TEST_CASE("what is torn is repaired by points that leave less off the source, th
         mended.push_back(path.target(5));
     }
     CHECK(farthest(mended) < 0.7 * farthest(torn));
-    const std::vector<Path> again = repair_surface(frame, 5, torn, beyond, 3);
+    const std::vector<Path> again = repaired(frame, 5, torn, beyond, 3);
     REQUIRE(again.size() == born.size());
     for (size_t i = 0; i < born.size(); ++i) CHECK(again[i].target(5).position == born[i].target(5).position);
-    CHECK(repair_surface(frame, 0, {}, beyond, 1).empty());
+    CHECK(repaired(frame, 0, {}, beyond, 1).empty());
 }
 
 TEST_CASE("thin liquid that no single point mends is mended by several at once") {
@@ -139,7 +143,7 @@ TEST_CASE("thin liquid that no single point mends is mended by several at once")
     for (const Triangle& t : thin.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
     const SurfaceFrame frame(std::move(mesh), edge);
     const std::vector<SurfacePoint> ball = points_of(24, radius);
-    const std::vector<Path> born = repair_surface(frame, 0, ball, 0.7f * edge, 2);
+    const std::vector<Path> born = repaired(frame, 0, ball, 0.7f * edge, 2);
     REQUIRE(born.size() >= 2);
     CHECK(glm::dot(born[0].target(0).normal, born[1].target(0).normal) < -0.3f);
     std::vector<SurfacePoint> mended = ball;

@@ -8,6 +8,7 @@
 
 #include "basis_tables.h"
 #include "frames_to_tracks.h"
+#include "points_to_mesh.h"
 #include "shapes.h"
 #include "surface_response.h"
 
@@ -222,13 +223,56 @@ TEST_CASE("coefficients chosen anew make up for each other, the same for any num
         spoilt.decoded[i] = dequantise_track(spoilt.tracks[i], spoilt.quantiser, goal.origin, tables());
     }
     CodedWindow refitted = spoilt, again = spoilt;
-    refit_tracks(window, refitted, goal, tables());
+    const std::vector<float> at_source(samples, 0.f);
+    refit_tracks(window, refitted, goal, tables(), at_source);
     CHECK(error(spoilt) > 1.5 * error(coded));
     CHECK(error(refitted) < 1.25 * error(coded));
     goal.jobs = 1;
-    refit_tracks(window, again, goal, tables());
+    refit_tracks(window, again, goal, tables(), at_source);
     for (size_t i = 0; i < refitted.tracks.size(); ++i) {
         CHECK(refitted.tracks[i].position == again.tracks[i].position);
         CHECK(refitted.tracks[i].second == again.tracks[i].second);
     }
+}
+
+TEST_CASE("coefficients chosen anew aim as far outside the source as they are told") {
+    Window window = standing_ball();
+    const WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    const CodedWindow coded = code_tracks(window, goal, tables());
+    const auto outside = [&](const CodedWindow& of) {  // on average
+        const SurfaceFrame& frame = *window.frames[0];
+        const Residual residual = measure_residual(frame, decoded_points(of.decoded, 0));
+        double sum = 0, area = 0;
+        for (size_t v = 0; v < residual.distance.size(); ++v) {
+            if (std::fabs(residual.distance[v]) > 3 * goal.tolerance) continue;
+            sum -= double(frame.area[v]) * residual.distance[v], area += frame.area[v];
+        }
+        return sum / area;
+    };
+    for (const float by : {0.3f, -0.3f}) {
+        CodedWindow moved = coded;
+        refit_tracks(window, moved, goal, tables(), std::vector<float>(samples, by * goal.tolerance));
+        CHECK((outside(moved) - outside(coded)) / goal.tolerance == doctest::Approx(by).epsilon(0.08));
+    }
+}
+
+TEST_CASE("the volume of thin liquid is the source's") {
+    Window window = standing_ball();
+    Mesh sheet = bumpy_sphere(160, radius);
+    for (glm::vec3& x : sheet.positions) x.z *= 0.15f;
+    const float edge = median_edge(sheet);
+    const auto frame = std::make_shared<const SurfaceFrame>(std::move(sheet), edge);
+    for (auto& motion : window.motion) motion.assign(frame->mesh.positions.size(), glm::vec3(0));
+    std::fill(window.frames.begin(), window.frames.end(), frame);
+    const WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    const CodedWindow coded = code_tracks(window, goal, tables());
+    double mean = 0;
+    for (int s = 0; s < samples; ++s) {
+        const double ratio = signed_volume(mesh_points(decoded_points(coded.decoded, s), frame->edge)) / signed_volume(frame->mesh);
+        mean += ratio / samples;
+        CHECK(std::fabs(ratio - 1) < 0.015);
+    }
+    CHECK(std::fabs(mean - 1) < 0.0025);
 }

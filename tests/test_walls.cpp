@@ -132,6 +132,20 @@ TEST_CASE("what lies flat in a wall goes through it, and nothing else moves") {
     CHECK(ball.positions == sphere(32, 1).positions);  // it only touches
 }
 
+TEST_CASE("of a volume, what lies in the container") {
+    const Mesh mesh = cube({-1, -1, -1}, {1, 1, 1});
+    const auto inside = [&](const Container& container) { return volume_inside(mesh, container); };
+    CHECK(inside(rill::surface::everywhere) == doctest::Approx(signed_volume(mesh)));
+    CHECK(signed_volume(mesh) == doctest::Approx(8).epsilon(1e-4));
+    CHECK(inside({{-0.5f, -1e30f, -1e30f}, {1e30f, 0.25f, 1e30f}}) == doctest::Approx(1.5 * 1.25 * 2).epsilon(1e-4));
+    CHECK(inside({{-2, -2, -2}, {2, 2, 2}}) == doctest::Approx(8).epsilon(1e-4));
+    CHECK(std::fabs(inside({{1.5f, -2, -2}, {2, 2, 2}})) < 1e-4);
+    // Four edges of 2 m between its sides, without the corners, where bevels of .2 m meet: prisms of .02 m², and as many from wall to floor.
+    const float far = 1e30f;
+    CHECK(inside({{-1, -1, -far}, {1, 1, far}, 0, 0.2f}) == doctest::Approx(8 - 4 * 2 * 0.02).epsilon(2e-3));
+    CHECK(inside({{-1, -1, -far}, {1, 1, far}, 0b0001, 0.2f}) == doctest::Approx(8 - 2 * 2 * 0.02).epsilon(1e-3));
+}
+
 TEST_CASE("decoded liquid ends at its walls exactly, closed and whole in cells of any size") {
     const TestFolder folder;
     constexpr int frames = 4;
