@@ -7,18 +7,10 @@
 #include <cstring>
 
 #include "mesher.h"
+#include "vector.h"
 
 namespace rill {
 namespace {
-
-struct Vector {
-    float x, y, z;
-};
-Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-float dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vector cross(const Vector& a, const Vector& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 /// A tile and its lower neighbours: bit a of the index set = one tile down along axis a.
 struct Neighbourhood {
@@ -168,10 +160,7 @@ bool same_group(const Mesher& m, uint32_t a, uint32_t b) {
 
 bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept {
     Vector p[4];
-    for (uint32_t k = 0; k < 4; ++k) {
-        const float* q = m.position + 3 * size_t(index[k]);
-        p[k] = {q[0], q[1], q[2]};
-    }
+    for (uint32_t k = 0; k < 4; ++k) p[k] = load(m.position + 3 * size_t(index[k]));
     const auto facing = [&](uint32_t from) {  // one way, when split there
         const Vector &q = p[from], across = p[from + 2] - q;
         return dot(cross(p[from + 1] - q, across), cross(across, p[(from + 3) & 3] - q)) > 0;

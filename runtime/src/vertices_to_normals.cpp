@@ -16,23 +16,12 @@
 #include <cstring>
 
 #include "mesher.h"
+#include "vector.h"
 
 namespace rill {
 namespace {
 
 constexpr float triangles_share = 0.45f;
-
-struct Vector {
-    float x, y, z;
-};
-Vector load(const float* p) { return {p[0], p[1], p[2]}; }
-Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vector operator+(const Vector& a, const Vector& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Vector operator*(float k, const Vector& a) { return {k * a.x, k * a.y, k * a.z}; }
-float dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vector cross(const Vector& a, const Vector& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 /// What stands round the vertex of a patch: a vertex beyond each face that the patch crosses, and for each edge that it crosses a
 /// triangle, of the vertex and of those beyond the edge's two faces.

@@ -157,7 +157,8 @@ struct Range {
     float lower[3], upper[3];
 };
 /// Where a frame goes. Everything is written in asset space; the winding is counter-clockwise seen
-/// from the air; normals point into the air; velocity is the liquid's there, m/s;
+/// from the air; normals, of unit length, point into the air (in the smallest cells between the field's and the triangles', in
+/// larger ones the field's); velocity is the liquid's there, m/s;
 /// across the surface it is that with which the surface moves.
 struct Target {
     Stream position, normal, velocity;  ///< three floats each
