@@ -6,7 +6,7 @@
 //   the gradient alone                                          3.41  4.19  2.34  2.78
 //   half of it, half the triangles'                             3.32  3.98  2.32  2.62
 //   and the gradients of the vertices round it, too             3.27  3.92  2.28  2.57
-//   the same, but vertices on walls and bevels keep theirs      3.23  3.90  2.24  2.56   (kept, with .45: 3.21 3.89 2.23 2.55)
+//   the same, but vertices on walls and bevels keep theirs      3.23  3.90  2.24  2.56   (kept, with .4: 3.21 3.90 2.22 2.55)
 //   the triangles' alone                                        3.47  4.06  2.51  2.77
 //   half by differences of opposite neighbours, not triangles   3.34  4.09  2.30  2.68
 // Not only cells of the source's size would gain, but larger ones must turn into each other without a jump, and the gradient
@@ -21,7 +21,7 @@
 namespace rill {
 namespace {
 
-constexpr float triangles_share = 0.45f;
+constexpr float triangles_share = 0.4f;
 
 /// What stands round the vertex of a patch: a vertex beyond each face that the patch crosses, and for each edge that it crosses a
 /// triangle, of the vertex and of those beyond the edge's two faces.
