@@ -188,8 +188,8 @@ float depth_of(const SurfaceFrame& frame, const Mesh& decoded, const surface::Co
 
 /// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
 /// `changed`: the samples to look at (others have been found whole, or beyond mending); afterwards those with a new path.
-/// `depth`: of the samples looked at, of the surface as it was.
-void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std::vector<bool>& changed, std::vector<float>& depth) {
+/// `depth`, where wanted: of the samples looked at, of the surface as it was.
+void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std::vector<bool>& changed, std::vector<float>* depth = nullptr) {
     const size_t first = window.paths.size();
     const auto grown_at = [&](int s) {
         return std::any_of(window.paths.begin() + ptrdiff_t(first), window.paths.end(), [&](const Path& path) { return path.alive(s); });
@@ -204,7 +204,7 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std:
         const SurfaceFrame& frame = *window.frames[size_t(s)];
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         const Mesh decoded = mesh_points(points, frame.edge, goal.jobs, frame.mesh.positions.size());
-        depth[size_t(s)] = depth_of(frame, decoded, goal.container) * float(points.size()) / (float(points.size()) + few_points);
+        if (depth) (*depth)[size_t(s)] = depth_of(frame, decoded, goal.container) * float(points.size()) / (float(points.size()) + few_points);
         for (Path& path : repair_surface(frame, s, points, decoded, repair_beyond * goal.tolerance, goal.jobs))
             window.paths.push_back(std::move(path));
     }
@@ -388,7 +388,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         const float most = most_offset * goal.tolerance;
         for (size_t s = 0; s < offset.size(); ++s) offset[s] = std::clamp(offset[s] + depth[s], -most, most);
     };
-    mend(window, coded, goal, changed, depth);
+    mend(window, coded, goal, changed, &depth);
     lift();
     code_from(grown);
     drop_fleeting(window, coded, goal);
@@ -400,7 +400,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
     changed.assign(window.frames.size(), true);
     for (int round = 0; round < last_mendings; ++round) {
         const size_t mended = window.paths.size();
-        mend(window, coded, goal, changed, depth);
+        mend(window, coded, goal, changed, round == 0 ? &depth : nullptr);
         code_from(mended);
         if (round > 0) continue;
         lift();

@@ -57,15 +57,12 @@ CellPattern plain_pattern(const Tile& tile, uint32_t cell) {
 
 /// Whether the cell beyond a face is of the same size and has that face doubled, too.
 bool doubled_beyond(const Mesher& m, const Tile& tile, uint32_t cell, uint32_t face) {
-    int32_t at[3] = {int32_t(cell % 8), int32_t(cell / 8 % 8), int32_t(cell / 64)}, side[3] = {};
-    side[face / 2] = face & 1 ? 1 : -1;
-    at[face / 2] += side[face / 2];
+    int32_t at[3] = {int32_t(cell % 8), int32_t(cell / 8 % 8), int32_t(cell / 64)};
+    at[face / 2] += face & 1 ? 1 : -1;
     const Tile* beyond = &tile;
     if (at[face / 2] < 0 || at[face / 2] >= tile_cells) {
-        if (tile.at_place(place_of(side[0], side[1], side[2])) != beside_same) return false;
-        const int32_t coord[3] = {tile.coord[0] + side[0], tile.coord[1] + side[1], tile.coord[2] + side[2]};
         at[face / 2] &= tile_cells - 1;
-        const uint32_t index = find_tile(m, tile.level, coord);
+        const uint32_t index = find_beyond(m, tile, face);
         if (index == no_tile) return false;
         beyond = &m.tiles[index];
     }
@@ -336,11 +333,6 @@ bool find_normal(const MesherScratch& s, uint32_t i, float (&normal)[3]) {
 }
 
 bool is_moving(const Mesher& m) { return m.input.velocity && m.input.target && m.input.target->velocity.data; }
-
-void write3(const Stream& stream, uint32_t index, const float v[3]) {
-    if (stream.data)
-        std::memcpy(static_cast<uint8_t*>(stream.data) + size_t(index) * stream.stride, v, 3 * sizeof(float));
-}
 
 /// Where vertices go: to the target, moved to their parents' if they morph; or they are those parents'.
 struct Output {

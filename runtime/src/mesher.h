@@ -4,6 +4,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "cell_patches.h"
 #include "format/bits.h"
@@ -64,6 +65,11 @@ struct Vertex {
     float position[3], normal[3], velocity[3];
     bool of_field;               ///< the normal
 };
+
+/// Where the target wants it; nowhere if it does not.
+inline void write3(const Stream& stream, uint32_t index, const float (&v)[3]) {
+    if (stream.data) std::memcpy(static_cast<uint8_t*>(stream.data) + size_t(index) * stream.stride, v, sizeof(v));
+}
 
 /// Cells twice as large in the place of a tile's own, towards which its vertices move: see cells_to_parents.cpp.
 struct ParentCells {
@@ -151,6 +157,8 @@ void for_tiles(uint32_t task, uint32_t per_task, uint32_t count, Work work) {
 
 // tiles.cpp
 uint32_t find_tile(const Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
+/// The tile beyond a face; no_tile where there is none of the same size.
+uint32_t find_beyond(const Mesher& m, const Tile& tile, uint32_t face) noexcept;
 /// no_tile when it is out of sight, out of reach, or no room is left. The octree must have a leaf there.
 uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
 /// The leaf that holds a position; false when that is out of reach.

@@ -107,6 +107,14 @@ bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t c
     return place(level);
 }
 
+uint32_t find_beyond(const Mesher& m, const Tile& tile, uint32_t face) noexcept {
+    int32_t side[3] = {};
+    side[face / 2] = face & 1 ? 1 : -1;
+    if (tile.at_place(place_of(side[0], side[1], side[2])) != beside_same) return no_tile;
+    const int32_t coord[3] = {tile.coord[0] + side[0], tile.coord[1] + side[1], tile.coord[2] + side[2]};
+    return find_tile(m, tile.level, coord);
+}
+
 uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) noexcept {
     const uint32_t slot = slot_of(m, level, coord);
     if (m.hash[slot]) return m.hash[slot] - 1;

@@ -13,7 +13,6 @@
 // does not depend on where cells lie: so only the smallest cells do this, and ever less where they turn into larger ones.
 #include <array>
 #include <cmath>
-#include <cstring>
 
 #include "mesher.h"
 #include "vector.h"
@@ -59,13 +58,8 @@ struct TileNormals {
 
     TileNormals(const Mesher& mesher, const Tile& of) : m(mesher), tile(of) {
         for (uint32_t face = 0; face < 6; ++face) {
-            int32_t side[3] = {};
-            side[face / 2] = face & 1 ? 1 : -1;
-            beyond[face] = nullptr;
-            if (tile.at_place(place_of(side[0], side[1], side[2])) != beside_same) continue;
-            const int32_t coord[3] = {tile.coord[0] + side[0], tile.coord[1] + side[1], tile.coord[2] + side[2]};
-            const uint32_t index = find_tile(m, tile.level, coord);
-            if (index != no_tile && m.tiles[index].rank < m.kept) beyond[face] = &m.tiles[index];
+            const uint32_t index = find_beyond(m, tile, face);
+            beyond[face] = index != no_tile && m.tiles[index].rank < m.kept ? &m.tiles[index] : nullptr;
         }
     }
 
@@ -109,10 +103,9 @@ struct TileNormals {
     }
 
     void write(const Ring& ring, uint32_t cell, uint32_t self) const {
-        const Stream& to = m.input.target->normal;
         Vector normal = load(m.normal + 3 * size_t(self));
         if (tile.level == 0 && m.of_field[self]) normal = lean(normal, ring, cell, self);
-        std::memcpy(static_cast<uint8_t*>(to.data) + size_t(self) * to.stride, &normal, sizeof(normal));
+        write3(m.input.target->normal, self, {normal.x, normal.y, normal.z});
     }
 
     void write_cell(uint32_t cell) const {
