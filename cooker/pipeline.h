@@ -9,7 +9,7 @@
 //   surface_motion         how each surface moves onto the next
 //   samples_to_tracks      points are carried through the window's frames by that motion, held to the surface
 //   tracks_to_surface      what the tracks decode to, measured at every source vertex; corrections
-//   points_to_repairs      what coding has torn is mended, by trial
+//   points_to_repairs      what coding has torn is mended, by trial; torn_necks.h finds what is thin but holds pieces together
 //   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
 //   refit_tracks           coefficients chosen anew, against the surface that all tracks decode to together
 //   coefficients_to_layers progressive order, blocks

@@ -5,10 +5,12 @@
 // tried: README.md, "Spurs".
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "parallel.h"
 #include "pipeline.h"
 #include "points_to_mesh.h"
+#include "torn_necks.h"
 
 namespace rill::cooker {
 namespace {
@@ -28,6 +30,12 @@ constexpr float probe_spacing = 0.25f;    // .2: twice as many probes, bytes at 
 constexpr float most_depth = 0.8f;        // of a probe
 constexpr float candidates_apart = 0.32f; // unless they face apart
 constexpr float cleared = 0.8f;           // places begin no nearer to an earlier one
+// A neck is thin: it takes more probes to see it, mending it mends few of them, and it must be so thick that corners of cells lie in it,
+// whatever the source's is.
+constexpr float neck_spacing = 0.125f, neck_depth = 0.1f;
+constexpr double least_neck_gain = 0.2;
+constexpr float neck_thicker = 0.15f;
+constexpr double torn_counts = 2;            // as so much of confusion()
 
 // A trial's time is that of its points: without this limit cooks of violent liquid take 12 to 26 % more of it, for the same figures.
 constexpr size_t enough_near = 100;
@@ -53,7 +61,7 @@ bool is_thin(const SurfaceFrame& frame, const glm::vec3& x) {
     return std::any_of(found.begin(), found.end(), [&](const auto& f) { return glm::dot(frame.mesh.normals[f.vertex], normal) < -same_side; });
 }
 /// Vertices of either surface that are farther than `beyond` from the other, worst first.
-std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded, float beyond, int jobs) {
+std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded, const SurfaceIndex& on_decoded, float beyond, int jobs) {
     std::vector<OffSurface> off;
     const auto look = [&](const std::vector<glm::vec3>& positions, const SurfaceIndex& other) {
         const std::vector<uint32_t> found = find_beyond(other, positions, beyond, jobs);
@@ -65,7 +73,7 @@ std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded,
             off[before + i] = {x, std::min(other.closest(x, most).distance, most)};
         });
     };
-    look(frame.mesh.positions, SurfaceIndex(decoded, jobs)), look(decoded.positions, frame.index);
+    look(frame.mesh.positions, on_decoded), look(decoded.positions, frame.index);
     std::stable_sort(off.begin(), off.end(), [](const OffSurface& a, const OffSurface& b) { return a.distance > b.distance; });
     return off;
 }
@@ -82,19 +90,22 @@ float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most) {
 struct Place {
     glm::vec3 centre;
     float radius;
+    std::optional<NeckCorners> neck;
+    std::vector<float> torn;      ///< values at the neck's corners as it was found
     std::vector<float> x, y, z, depth;
     std::vector<SurfacePoint> candidates;
 };
 
 void find_probes(const SurfaceFrame& frame, Place& place) {
-    const int reach = int(std::lround(1 / probe_spacing));
+    const float spacing = place.neck ? neck_spacing : probe_spacing, least = place.neck ? neck_depth : least_depth;
+    const int reach = int(std::lround(1 / spacing));
     for (int k = -reach; k <= reach; ++k)
         for (int j = -reach; j <= reach; ++j)
             for (int i = -reach; i <= reach; ++i) {
                 if (i * i + j * j + k * k > reach * reach) continue;
-                const glm::vec3 x = place.centre + probe_spacing * place.radius * glm::vec3(i, j, k);
+                const glm::vec3 x = place.centre + spacing * place.radius * glm::vec3(i, j, k);
                 const float depth = depth_at(frame, x, most_depth * place.radius);
-                if (std::fabs(depth) < least_depth * frame.edge) continue;
+                if (std::fabs(depth) < least * frame.edge) continue;
                 place.x.push_back(x.x), place.y.push_back(x.y), place.z.push_back(x.z), place.depth.push_back(depth);
             }
 }
@@ -109,6 +120,7 @@ void find_candidates(const SurfaceFrame& frame, Place& place) {
             return glm::distance(p.position, q.position) < candidates_apart * place.radius && glm::dot(p.normal, q.normal) > same_side;
         });
         if (taken || !settle(frame, point_radius * frame.edge, p)) continue;
+        if (place.neck) p.position += neck_thicker * frame.edge * p.normal;
         place.candidates.push_back(p);
         if (place.candidates.size() == most_candidates) return;
     }
@@ -137,20 +149,31 @@ std::vector<SurfacePoint> points_around(const SurfaceFrame& frame, const std::ve
     return around;
 }
 
+/// The field of the points at positions.
+std::vector<float> values_at(const PointField& decoded, const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z) {
+    const auto range = [](const std::vector<float>& v) { return std::minmax_element(v.begin(), v.end()); };
+    const auto [x0, x1] = range(x);
+    const auto [y0, y1] = range(y);
+    const auto [z0, z1] = range(z);
+    std::vector<float> value(x.size());
+    std::vector<uint32_t> candidates(decoded.field.point_count);
+    const surface::Box box{{*x0, *y0, *z0}, {*x1, *y1, *z1}};
+    const uint32_t found = surface::gather(decoded.field, box, candidates.data(), uint32_t(candidates.size()));
+    surface::evaluate(decoded.field, candidates.data(), found, x.data(), y.data(), z.data(), uint32_t(value.size()), value.data());
+    return value;
+}
+
 /// Integral, over the place's liquid and air that the points decode as the other, of its depth: edges, per probe of a least place.
 double confusion(const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points) {
+    if (place.x.empty()) return 0;
     const PointField decoded(points);
-    std::vector<float> value(place.x.size());
-    std::vector<uint32_t> candidates(points.size());
-    const glm::vec3 reach(place.radius), lower = place.centre - reach, upper = place.centre + reach;
-    const surface::Box box{{lower.x, lower.y, lower.z}, {upper.x, upper.y, upper.z}};
-    const uint32_t found = surface::gather(decoded.field, box, candidates.data(), uint32_t(candidates.size()));
-    surface::evaluate(decoded.field, candidates.data(), found, place.x.data(), place.y.data(), place.z.data(), uint32_t(value.size()),
-                      value.data());
-    double sum = 0;
+    const std::vector<float> value = values_at(decoded, place.x, place.y, place.z);
+    double sum = 0, torn = 0;
     for (size_t i = 0; i < value.size(); ++i)
         if ((value[i] < 0) != (place.depth[i] > 0)) sum += std::fabs(place.depth[i]) / frame.edge;
-    return sum * std::pow(place.radius / (least_radius * frame.edge), 3);
+    if (place.neck && place.neck->is_torn(values_at(decoded, place.neck->x, place.neck->y, place.neck->z), place.torn)) torn = torn_counts;
+    const double apart = place.neck ? neck_spacing / probe_spacing : 1;
+    return torn + sum * std::pow(apart * place.radius / (least_radius * frame.edge), 3);
 }
 
 /// Candidates that are tried together, and the place's confusion with them among the points.
@@ -211,10 +234,12 @@ Trial best_together(const SurfaceFrame& frame, const Place& place, const std::ve
 void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
     const bool all = place.radius > wide * frame.edge;
     std::vector<SurfacePoint> around = all ? points : points_around(frame, points, place.centre);
+    if (place.neck) place.torn = values_at(PointField(around), place.neck->x, place.neck->y, place.neck->z);
     double now = confusion(frame, place, around);
-    if (now >= least_gain) find_candidates(frame, place);  // else no trial could pay: three places of four at fine errors
+    const double gain = place.neck ? least_neck_gain : least_gain;
+    if (now >= gain) find_candidates(frame, place);  // else no trial could pay: three places of four at fine errors
     for (size_t taken = 0; taken < most_repairs && !place.candidates.empty();) {
-        const double least = std::clamp(least_share * now, least_gain, most_gain);
+        const double least = place.neck ? gain : std::clamp(least_share * now, gain, most_gain);
         const size_t most = std::min(most_repairs - taken, size_t(now / least));  // more could not pay
         if (most == 0) return;
         const auto pays = [&](const Trial& trial) { return now - trial.confusion >= double(trial.taken.size()) * least; };
@@ -237,9 +262,15 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
 std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
                                  float beyond, int jobs) {
     if (points.empty() || frame.mesh.triangles.empty()) return {};
+    const DecodedPieces pieces(decoded, jobs);
     std::vector<Place> places;
-    for (const OffSurface& off : find_off(frame, decoded, beyond, jobs)) {
-        const auto near = [&](const Place& p) { return glm::distance(p.centre, off.position) < cleared * p.radius; };
+    for (const TornNeck& neck : find_torn_necks(frame, pieces)) {
+        Place& place = places.emplace_back();
+        place.centre = neck.middle, place.radius = least_radius * frame.edge;
+        place.neck.emplace(neck, frame.edge, place.radius, pieces);
+    }
+    for (const OffSurface& off : find_off(frame, decoded, pieces.index, beyond, jobs)) {
+        const auto near = [&](const Place& p) { return !p.neck && glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(places.begin(), places.end(), near)) continue;
         if (places.size() > points.size() / points_per_place) break;
         Place& place = places.emplace_back();

@@ -9,6 +9,7 @@
 #include "points_to_mesh.h"
 #include "shapes.h"
 #include "surface_distance.h"
+#include "torn_necks.h"
 
 using namespace rill::cooker;
 
@@ -151,4 +152,65 @@ TEST_CASE("thin liquid that no single point mends is mended by several at once")
     for (size_t i = ball.size(); i < mended.size(); ++i) CHECK(mended[i].position.x > 1);
     const std::vector<uint32_t> lost = find_beyond(SurfaceIndex(mesh_points(mended, edge)), frame.mesh.positions, edge, 2);
     CHECK(lost.size() < thin.positions.size() / 2);
+}
+
+namespace {
+
+/// Two balls of `ball` edges joined by a neck of `neck` edges along x, as a surface of revolution.
+Mesh dumbbell(float edge, float ball, float neck, float apart) {
+    Mesh mesh = sphere(96, 1);
+    for (glm::vec3& x : mesh.positions) {
+        const float along = (ball + apart) * x.x, off = std::max(std::fabs(along) - apart, 0.f) / ball;  // from the balls' middles out
+        const float in = std::fabs(along) - apart, at_ball = std::sqrt(std::max(ball * ball - in * in, 0.f));
+        const float round = off > 0 ? at_ball : std::max(at_ball, neck), length = std::sqrt(x.y * x.y + x.z * x.z);
+        const float scale = length > 1e-4f ? round / length : 0;
+        x = edge * glm::vec3(along, scale * x.y, scale * x.z);
+    }
+    return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("a neck that is torn is found where it is, and mended") {
+    constexpr float edge = 0.05f, ball = 3, apart = 3.6f;
+    float neck = 0;
+    SUBCASE("thick") { neck = 0.9f; }
+    SUBCASE("thin") { neck = 0.5f; }
+    CAPTURE(neck);
+    const SurfaceFrame frame(dumbbell(edge, ball, neck, apart), edge);
+    std::vector<SurfacePoint> points;
+    for (const float side : {-1.f, 1.f})
+        for (const SurfacePoint& p : points_of(16, ball * edge, {side * apart * edge, 0, 0})) points.push_back(p);
+    const Mesh torn = mesh_points(points, edge);
+    REQUIRE(topology(torn, edge).large_components == 2);
+    REQUIRE(topology(frame.mesh, edge).large_components == 1);
+    const DecodedPieces pieces(torn, 1);
+    const std::vector<TornNeck> necks = find_torn_necks(frame, pieces);
+    REQUIRE(!necks.empty());
+    for (const TornNeck& found : necks) {
+        CHECK(glm::length(found.middle) < edge);
+        CHECK(found.pieces[0] != found.pieces[1]);
+    }
+    // Farther off than any vertex is: only the neck can be the reason.
+    const std::vector<Path> born = repaired(frame, 0, points, 5 * edge, 2);
+    REQUIRE(!born.empty());
+    for (const Path& path : born) points.push_back(path.target(0));
+    const Mesh mended = mesh_points(points, edge);
+    CHECK(topology(mended, edge).large_components == 1);
+    CHECK(find_torn_necks(frame, DecodedPieces(mended, 1)).empty());
+}
+
+TEST_CASE("pieces that are the source's own are not torn") {
+    constexpr float edge = 0.05f;
+    Mesh mesh = sphere(64, 0.5f), drop = sphere(16, 0.15f, {0.7f, 0, 0});
+    const uint32_t first = uint32_t(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), drop.positions.begin(), drop.positions.end());
+    for (const Triangle& t : drop.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    const SurfaceFrame frame(Mesh(mesh), edge);
+    std::vector<SurfacePoint> points = points_of(24, 0.5f);
+    for (const SurfacePoint& p : points_of(10, 0.15f, {0.7f, 0, 0})) points.push_back(p);
+    const Mesh decoded = mesh_points(points, edge);
+    REQUIRE(topology(decoded, edge).large_components == 2);
+    CHECK(find_torn_necks(frame, DecodedPieces(decoded, 1)).empty());
+    CHECK(find_torn_necks(frame, DecodedPieces(Mesh{}, 1)).empty());
 }
