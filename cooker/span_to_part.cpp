@@ -37,7 +37,7 @@ constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a sear
 /// the rest be for the same p99; but .4 at most, or liquid ends before its walls. The finer, the more of the error is not the points'.
 double first_tolerance(double edges, double wall_share) {
     const double finer = std::max(0.25 / edges, 1.0);
-    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 0.6 : 0.2) + 0.9 * std::pow(finer, 0.15) * std::min(wall_share, 0.4);
+    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 0.6 : 0.2) + 0.8 * std::pow(finer, 0.3) * std::min(wall_share, 0.4);
 }
 /// The next attempt's, in the last one's: from how the last two errors, in the one aimed at, went with their tolerances (0: none before).
 double next_tolerance(double edges, double ratio, double tolerance, double ratio_before, double tolerance_before) {
