@@ -97,7 +97,7 @@ double residual_percentile(const SurfaceFrame& frame, const Residual& residual, 
 std::vector<SurfacePoint> choose_births(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
                                         float threshold, float tolerance);
 /// Paths born at a sample where what the points decode to (mesh_points()) and the source are more than `beyond` metres apart, in either
-/// direction: those that, by trial, leave the decoded surface better there.
+/// direction, or a neck is torn: those that, by trial, leave the decoded surface better there.
 std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
                                  float beyond, int jobs);
 

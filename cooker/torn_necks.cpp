@@ -125,7 +125,7 @@ size_t NeckCorners::liquid_corner(uint32_t piece, const std::vector<float>& valu
 
 bool NeckCorners::is_torn(const std::vector<float>& value, const std::vector<float>& before) const {
     const size_t from = liquid_corner(neck_.pieces[0], before), to = liquid_corner(neck_.pieces[1], before);
-    if (from == x.size() || to == x.size()) return false;  // no corner of theirs is near: nothing tells
+    if (from == x.size() || to == x.size()) return false;
     std::vector<bool> reached(x.size(), false);
     std::vector<size_t> next{from};
     reached[from] = value[from] < 0;
