@@ -120,6 +120,20 @@ std::vector<uint32_t> label_components(const Mesh& mesh) {
     return parent;
 }
 
+std::vector<double> label_volumes(const Mesh& mesh, const std::vector<uint32_t>& label) {
+    std::vector<double> six_volumes(mesh.positions.size(), 0.0);
+    for (const Triangle& t : mesh.triangles) {
+        const uint32_t root = label[t[0]];
+        const glm::dvec3 origin = mesh.positions[root];
+        const glm::dvec3 a = glm::dvec3(mesh.positions[t[0]]) - origin;
+        const glm::dvec3 b = glm::dvec3(mesh.positions[t[1]]) - origin;
+        const glm::dvec3 c = glm::dvec3(mesh.positions[t[2]]) - origin;
+        six_volumes[root] += glm::dot(a, glm::cross(b, c));
+    }
+    for (double& volume : six_volumes) volume /= 6;
+    return six_volumes;
+}
+
 void drop_degenerate(Mesh& mesh) {
     std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
 }

@@ -46,6 +46,8 @@ struct OpenEdge {
 std::vector<OpenEdge> open_edges(const Mesh& mesh);
 /// Per vertex: the connected component it belongs to, named by its first vertex.
 std::vector<uint32_t> label_components(const Mesh& mesh);
+/// By that name, their signed volumes, m³; 0 for all other vertices.
+std::vector<double> label_volumes(const Mesh& mesh, const std::vector<uint32_t>& label);
 /// Takes out triangles that name a vertex twice.
 void drop_degenerate(Mesh& mesh);
 /// `triangles` of the mesh, with the vertices they use and what those carry.

@@ -177,20 +177,12 @@ Topology topology(const Mesh& mesh, double cell) {
 
 std::vector<double> component_volumes(const Mesh& mesh) {
     const std::vector<uint32_t> component = label_components(mesh);
-    std::vector<double> six_volumes(mesh.positions.size(), 0.0);
+    const std::vector<double> of_label = label_volumes(mesh, component);
     std::vector<bool> used(mesh.positions.size(), false);
-    for (const Triangle& t : mesh.triangles) {
-        const uint32_t root = component[t[0]];
-        const glm::dvec3 origin = mesh.positions[root];
-        const glm::dvec3 a = glm::dvec3(mesh.positions[t[0]]) - origin;
-        const glm::dvec3 b = glm::dvec3(mesh.positions[t[1]]) - origin;
-        const glm::dvec3 c = glm::dvec3(mesh.positions[t[2]]) - origin;
-        six_volumes[root] += glm::dot(a, glm::cross(b, c));
-        used[root] = true;
-    }
+    for (const Triangle& t : mesh.triangles) used[component[t[0]]] = true;
     std::vector<double> volumes;
     for (size_t v = 0; v < used.size(); ++v)
-        if (used[v]) volumes.push_back(six_volumes[v] / 6);
+        if (used[v]) volumes.push_back(of_label[v]);
     std::sort(volumes.begin(), volumes.end(), std::greater<>());
     return volumes;
 }

@@ -16,16 +16,6 @@ constexpr double much_larger = 1.6;  // whatever has been torn in two, the small
 constexpr float around_piece = 2;    // edges from it, within which it was torn off
 constexpr float neck_width = 2;      // edges: places nearer to each other belong to one neck
 
-/// Signed volume of every connected piece, by its name.
-std::vector<double> volumes_of(const Mesh& mesh, const std::vector<uint32_t>& label) {
-    std::vector<double> volume(mesh.positions.size(), 0);
-    for (const Triangle& t : mesh.triangles) {
-        const glm::dvec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
-        volume[label[t[0]]] += glm::dot(a, glm::cross(b, c)) / 6;
-    }
-    return volume;
-}
-
 /// Vertices of the larger of the pieces but the largest, by the pieces' names.
 std::map<uint32_t, std::vector<uint32_t>> pieces_of(const std::vector<uint32_t>& label, const std::vector<double>& volume, double least) {
     const size_t largest = size_t(std::max_element(volume.begin(), volume.end()) - volume.begin());
@@ -76,7 +66,7 @@ std::vector<TornNeck> find_torn_necks(const SurfaceFrame& frame, const DecodedPi
     const Mesh& source = frame.mesh;
     if (source.triangles.empty() || decoded.mesh.triangles.empty()) return necks;
     const std::vector<uint32_t> source_label = label_components(source);
-    const std::vector<double> volume = volumes_of(decoded.mesh, decoded.label), source_volume = volumes_of(source, source_label);
+    const std::vector<double> volume = label_volumes(decoded.mesh, decoded.label), source_volume = label_volumes(source, source_label);
     for (const auto& [piece, vertices] : pieces_of(decoded.label, volume, least_piece * std::pow(double(frame.edge), 3))) {
         const uint32_t home = home_of(frame, source_label, decoded.mesh, vertices);
         if (source_volume[home] < much_larger * volume[piece]) continue;

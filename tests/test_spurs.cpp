@@ -160,9 +160,9 @@ namespace {
 Mesh dumbbell(float edge, float ball, float neck, float apart) {
     Mesh mesh = sphere(96, 1);
     for (glm::vec3& x : mesh.positions) {
-        const float along = (ball + apart) * x.x, off = std::max(std::fabs(along) - apart, 0.f) / ball;  // from the balls' middles out
-        const float in = std::fabs(along) - apart, at_ball = std::sqrt(std::max(ball * ball - in * in, 0.f));
-        const float round = off > 0 ? at_ball : std::max(at_ball, neck), length = std::sqrt(x.y * x.y + x.z * x.z);
+        const float along = (ball + apart) * x.x, beyond = std::fabs(along) - apart;  // a ball's middle
+        const float at_ball = std::sqrt(std::max(ball * ball - beyond * beyond, 0.f));
+        const float round = beyond > 0 ? at_ball : std::max(at_ball, neck), length = std::sqrt(x.y * x.y + x.z * x.z);
         const float scale = length > 1e-4f ? round / length : 0;
         x = edge * glm::vec3(along, scale * x.y, scale * x.z);
     }
@@ -202,11 +202,10 @@ TEST_CASE("a neck that is torn is found where it is, and mended") {
 
 TEST_CASE("pieces that are the source's own are not torn") {
     constexpr float edge = 0.05f;
-    Mesh mesh = sphere(64, 0.5f), drop = sphere(16, 0.15f, {0.7f, 0, 0});
-    const uint32_t first = uint32_t(mesh.positions.size());
-    mesh.positions.insert(mesh.positions.end(), drop.positions.begin(), drop.positions.end());
-    for (const Triangle& t : drop.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-    const SurfaceFrame frame(Mesh(mesh), edge);
+    Mesh mesh = sphere(64, 0.5f);
+    const Mesh drop = sphere(16, 0.15f, {0.7f, 0, 0});
+    append(mesh, drop);
+    const SurfaceFrame frame(std::move(mesh), edge);
     std::vector<SurfacePoint> points = points_of(24, 0.5f);
     for (const SurfacePoint& p : points_of(10, 0.15f, {0.7f, 0, 0})) points.push_back(p);
     const Mesh decoded = mesh_points(points, edge);
