@@ -408,6 +408,7 @@ CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::Ba
         refit_tracks(window, coded, goal, tables, offset);
         changed.assign(window.frames.size(), true);
     }
+    refit_volume(window, coded, goal, tables);
     for (const TrackSamples& drop : track_drops(window, drops_of(window, coded, goal))) {
         coded.tracks.push_back(quantise_track(drop, coded.quantiser, goal.origin, tables));
         coded.decoded.push_back(dequantise_track(coded.tracks.back(), coded.quantiser, goal.origin, tables));

@@ -276,3 +276,37 @@ TEST_CASE("the volume of thin liquid is the source's") {
     }
     CHECK(std::fabs(mean - 1) < 0.0025);
 }
+
+TEST_CASE("heights of few points are stepped until the volume is the source's, and no more; the same for any number of threads") {
+    Window window = standing_ball();
+    WindowGoal goal = goal_of(window, 0.6f);
+    grow_tracks(window, {}, goal);
+    CodedWindow coded = code_tracks(window, goal, tables());
+    const auto volume = [&](int s) {
+        const SurfaceFrame& frame = *window.frames[size_t(s)];
+        return signed_volume(mesh_points(decoded_points(coded.decoded, s), frame.edge)) / signed_volume(frame.mesh);
+    };
+    const auto refitted = [&](const CodedWindow& from, int jobs) {
+        CodedWindow to = from;
+        goal.jobs = jobs;
+        refit_volume(window, to, goal, tables());
+        size_t stepped = 0;
+        for (size_t i = 0; i < to.tracks.size(); ++i) stepped += to.tracks[i].position != from.tracks[i].position;
+        return std::pair{to, stepped};
+    };
+    REQUIRE(decoded_points(coded.decoded, 0).size() < 100);
+    CHECK(refitted(coded, 2).second == 0);
+    for (size_t i = 0; i < coded.tracks.size(); i += 4) {
+        coded.tracks[i].position[2] -= 2;
+        coded.decoded[i] = dequantise_track(coded.tracks[i], coded.quantiser, goal.origin, tables());
+    }
+    for (int s = 0; s < samples; ++s) REQUIRE(volume(s) < 0.996);
+    const auto [alone, stepped_alone] = refitted(coded, 1);
+    const auto [together, stepped] = refitted(coded, 2);
+    CHECK(stepped == stepped_alone);
+    CHECK(stepped <= coded.tracks.size() / 2);
+    for (size_t i = 0; i < coded.tracks.size(); ++i) CHECK(alone.tracks[i].position == together.tracks[i].position);
+    coded = together;
+    for (int s = 0; s < samples; ++s) CHECK(std::fabs(volume(s) - 1) < 0.003);
+    CHECK(refitted(coded, 2).second == 0);
+}
