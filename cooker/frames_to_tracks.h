@@ -32,7 +32,7 @@ void aim_outside(const SurfaceFrame& frame, const surface::Container& container,
 /// Chooses the coefficients of all tracks anew, so that together they decode to the least error for their bits.
 /// `offset`: metres outside the source that are aimed at, by sample.
 void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset);
-/// Steps of mean heights that bring the volume of frames of few points nearer to the source's.
+/// Steps of mean heights that bring the volume of pieces of few points nearer to the source's.
 void refit_volume(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
 /// Those that reach the last sample, as one-sample paths: what the next window continues.
 std::vector<Path> survivors_of(const Window& window);

@@ -12,7 +12,7 @@
 //   points_to_repairs      what coding has torn is mended, by trial; torn_necks.h finds what is thin but holds pieces together
 //   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
 //   refit_tracks           coefficients chosen anew, against the surface that all tracks decode to together
-//   refit_volume           in frames of few points heights go by a step, until the volume is the source's
+//   refit_volume           heights of the points of small pieces go by a step, until the volume is the source's
 //   coefficients_to_layers progressive order, blocks
 //   layers_to_chunks       entropy coding
 //   chunks_to_asset        the file

@@ -16,10 +16,15 @@ namespace {
 using dvec3 = glm::dvec3;
 constexpr uint32_t max_terms = format::max_terms;
 
-/// Coefficients below this fraction of a step are dropped: they cost more than they mend.
-constexpr double dead_zone = 0.62;
-/// Others are rounded down up to this fraction: what it takes away is mostly the noise of the source's cells.
-constexpr double rounded_up_from = 0.75;
+struct Rounding {
+    double dead_zone;  ///< coefficients below this fraction of a step are dropped: they cost more than they mend
+    double up_from;    ///< others are rounded down up to this fraction: what it takes away is mostly the noise of the source's cells
+};
+constexpr Rounding of_points{0.62, 0.75}, of_shapes{0.5, 0.5};
+/// Of the tolerance over time: a droplet's volume goes with the cube of what its axes are off. README.md, "Drops and bubbles".
+constexpr double shape_tolerance = 0.3;
+/// What a shape off by a step of the lattice counts, against a volume off by all of it, both squared.
+constexpr double still_shape = 0.001;
 /// Normals that lean further than this from the axis are kept as vectors, else as points of the plane at 1.
 constexpr double least_planar = 0.4;
 /// A life with a normal further than this from the axis has no tangential slack.
@@ -54,15 +59,21 @@ uint32_t fewest_terms(const Basis& basis, const Series& c, const Signal& signal,
     return 0;
 }
 
+/// A shape as a matrix; the order is that of TrackSamples::shape.
+template <class Shape>
+glm::dmat3 matrix_of(const Shape& v) {
+    return {v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2]};
+}
+
 int32_t checked(double value) {
     if (!(std::abs(value) < format::max_symbol))
         throw InputError("a track moves too far for this quantiser step");
     return int32_t(std::lround(value));
 }
-int32_t quantised(double value, double step) {
+int32_t quantised(double value, double step, const Rounding& rounding) {
     const double v = std::abs(value / step);
-    if (v < dead_zone) return 0;
-    return checked(std::copysign(std::max(1.0, std::floor(v + 1 - rounded_up_from)), value));
+    if (v < rounding.dead_zone) return 0;
+    return checked(std::copysign(std::max(1.0, std::floor(v + 1 - rounding.up_from)), value));
 }
 
 /// What a squared error of one step is worth in bits (the slope of the rate–distortion curve); and what it is worth to keep
@@ -77,14 +88,14 @@ struct Coded {
 /// Terms 1 … of a signal as integers, into channel `channel` of the rows.
 template <class Rows>
 Coded quantise_series(const Basis& basis, const Signal& signal, double tolerance, double step, int channel,
-                      Rows& rows) {
+                      Rows& rows, const Rounding& rounding = of_points) {
     Coded out;
     Series& c = out.series = project_on(basis, signal);
     uint32_t terms = fewest_terms(basis, c, signal, tolerance);
     out.within = terms > 0;
     if (terms == 0) terms = basis.terms;
     for (uint32_t k = 1; k < basis.terms; ++k) {
-        rows[k][channel] = k < terms ? quantised(c[k], step) : 0;
+        rows[k][channel] = k < terms ? quantised(c[k], step, rounding) : 0;
         out.cost += cost_of(rows[k][channel]);
         c[k] = rows[k][channel] * step;
     }
@@ -126,6 +137,7 @@ struct Fitter {
                             bool& within) const;
     Attempt attempt_point(const Basis& basis) const;
     Attempt attempt_drop(const Basis& basis) const;
+    void keep_volume(const Basis& basis, Rows<6>& shape) const;
 };
 
 bool Fitter::choose_axis(int32_t (&axis)[2]) const {
@@ -235,6 +247,37 @@ Attempt Fitter::attempt_point(const Basis& basis) const {
     return out;
 }
 
+/// A step of one axis is a tenth of a droplet's volume: of all ways to round the means of the three axes, takes the one with which
+/// the volume is nearest to its own over the life.
+void Fitter::keep_volume(const Basis& basis, Rows<6>& shape) const {
+    const uint32_t n = life();
+    std::vector<glm::dmat3> coded(n);
+    std::array<double, 3> off{};  // steps, as rounded
+    for (uint32_t s = 0; s < n; ++s) {
+        double v[6] = {};
+        for (uint32_t k = 0; k < basis.terms; ++k)
+            for (size_t c = 0; c < 6; ++c) v[c] += shape[k][c] * basis.row[s][k] * motion_step();
+        coded[s] = matrix_of(v);
+        for (size_t c = 0; c < 3; ++c) off[c] -= double(samples.shape[s][c]) / (std::sqrt(double(n)) * motion_step());
+    }
+    for (size_t c = 0; c < 3; ++c) off[c] += shape[0][c];
+    std::array<int32_t, 3> best{};
+    double least = INFINITY;
+    for (int way = 0; way < 27; ++way) {
+        const std::array<int32_t, 3> by{way % 3 - 1, way / 3 % 3 - 1, way / 9 - 1};
+        double cost = 0;
+        for (size_t c = 0; c < 3; ++c) cost += still_shape * n * (off[c] + by[c]) * (off[c] + by[c]);
+        for (uint32_t s = 0; s < n; ++s) {
+            glm::dmat3 m = coded[s];
+            for (int c = 0; c < 3; ++c) m[c][c] += by[size_t(c)] * basis.row[s][0] * motion_step();
+            const double larger = glm::determinant(m) / glm::determinant(matrix_of(samples.shape[s])) - 1;
+            cost += larger * larger;
+        }
+        if (cost < least) least = cost, best = by;
+    }
+    for (size_t c = 0; c < 3; ++c) shape[0][c] += best[c];
+}
+
 Attempt Fitter::attempt_drop(const Basis& basis) const {
     const uint32_t n = life();
     Attempt out;
@@ -242,23 +285,21 @@ Attempt Fitter::attempt_drop(const Basis& basis) const {
     track.axis[0] = track.axis[1] = 0;
     Rows<3> motion{};
     Rows<6> shape{};
-    const auto fit = [&](const Signal& signal, int c, auto& rows) {
-        out.add(quantise_series(basis, signal, quantiser.time_tolerance, motion_step(), c, rows));
-    };
     Signal signal(n);
     for (int c = 0; c < 3; ++c) {
         double mean = 0;
         for (uint32_t s = 0; s < n; ++s) mean += (signal[s] = position(s)[c]) / n;
         track.lattice[c] = checked(mean / tangent_step());
         motion[0][c] = checked((mean - track.lattice[c] * tangent_step()) / mean_step(steps, n));
-        fit(signal, c, motion);
+        out.add(quantise_series(basis, signal, quantiser.time_tolerance, motion_step(), c, motion));
     }
     for (int c = 0; c < 6; ++c) {
         double mean = 0;
         for (uint32_t s = 0; s < n; ++s) mean += (signal[s] = samples.shape[s][size_t(c)]) / n;
         shape[0][size_t(c)] = checked(mean * std::sqrt(double(n)) / motion_step());
-        fit(signal, c, shape);
+        out.add(quantise_series(basis, signal, shape_tolerance * quantiser.time_tolerance, motion_step(), c, shape, of_shapes));
     }
+    keep_volume(basis, shape);
     track.flags = uint8_t(samples.flags | (basis.cosine ? format::track_cosine : 0));
     track.drop = true;
     track.position = flattened(motion);

@@ -151,8 +151,7 @@ bool is_inside(const glm::vec3& x, const surface::Container& container) {
     return inside;
 }
 
-double volume_inside(Mesh mesh, const surface::Container& container) {
-    // Drawn onto the container, what lies beyond has no volume any more.
+void draw_inside(Mesh& mesh, const surface::Container& container) {
     for (glm::vec3& x : mesh.positions) {
         x = glm::clamp(x, glm::vec3(container.lower[0], container.lower[1], container.lower[2]), glm::vec3(container.upper[0], container.upper[1], container.upper[2]));
         surface::for_bevels(container, [&](const surface::Bevel& bevel) {
@@ -160,6 +159,10 @@ double volume_inside(Mesh mesh, const surface::Container& container) {
             for (int k = 0; k < 2 && beyond > 0; ++k) x[bevel.axis[k]] -= beyond * bevel.outward[k];
         });
     }
+}
+
+double volume_inside(Mesh mesh, const surface::Container& container) {
+    draw_inside(mesh, container);
     return signed_volume(mesh);
 }
 

@@ -43,6 +43,8 @@ int side_cut_at(const Mesh& mesh, const OpenEdge& e, uint32_t sides, const glm::
 void push_through_walls(Mesh& mesh, const surface::Container& container, float edge, float by);
 /// Nothing that is cut off, nor the cut.
 bool is_inside(const glm::vec3& x, const surface::Container& container);
+/// Moves what lies beyond the container onto it: there it encloses no volume any more.
+void draw_inside(Mesh& mesh, const surface::Container& container);
 /// Of what a closed mesh encloses, as much as lies in the container: m³.
 double volume_inside(Mesh mesh, const surface::Container& container);
 

@@ -316,7 +316,7 @@ TEST_CASE("the asset remembers how its source was to be read") {
     const auto source = open_source_of(clip.asset, clip.input, {});
     CHECK(source->info().frames_per_second == 48);
     const Verification result = verify(clip.asset, *source, 2);
-    CHECK(result.p99 < 1.2 * report.target_p99);
+    CHECK(result.p99 < 1.5 * report.target_p99);  // a bumpy ball as an ellipsoid
     CHECK(read_directory(clip.asset).header.upper[1] > 0.4);  // the source's z, which reaches higher than its y
     ReadOptions other;
     other.scale = 1;

@@ -310,3 +310,41 @@ TEST_CASE("heights of few points are stepped until the volume is the source's, a
     for (int s = 0; s < samples; ++s) CHECK(std::fabs(volume(s) - 1) < 0.003);
     CHECK(refitted(coded, 2).second == 0);
 }
+
+TEST_CASE("small pieces of points have their volume, too, beside a large one that keeps its own") {
+    Window window = standing_ball();
+    const float edge = window.frames[0]->edge;
+    Mesh both = bumpy_sphere(64, radius);
+    append(both, sphere(24, 5 * edge, {1.2f, 0, 0}, 0.3f));
+    const auto frame = std::make_shared<const SurfaceFrame>(both, edge);
+    for (auto& motion : window.motion) motion.assign(both.positions.size(), glm::vec3(0));
+    std::fill(window.frames.begin(), window.frames.end(), frame);
+    WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    CodedWindow coded = code_tracks(window, goal, tables());
+    const auto is_small = [](const glm::vec3& x) { return x.x > 0.8f; };
+    const auto volumes = [&] {  // of the large piece and the small one, in the source's
+        std::array<double, 2> ratio{};
+        for (const int sign : {1, -1}) {
+            const Mesh mesh = sign > 0 ? mesh_points(decoded_points(coded.decoded, 5), edge) : frame->mesh;
+            std::array<Mesh, 2> part;
+            for (const Triangle& t : mesh.triangles) part[is_small(mesh.positions[t[0]])].triangles.push_back(t);
+            for (size_t i = 0; i < 2; ++i) {
+                part[i].positions = mesh.positions;
+                ratio[i] = sign > 0 ? signed_volume(part[i]) : ratio[i] / signed_volume(part[i]);
+            }
+        }
+        return ratio;
+    };
+    CHECK(std::fabs(volumes()[1] - 1) < 0.035);
+    const double large = volumes()[0];
+    for (size_t i = 0; i < coded.tracks.size(); ++i) {
+        if (!is_small(coded.decoded[i].position[0])) continue;
+        coded.tracks[i].position[2] -= 3;
+        coded.decoded[i] = dequantise_track(coded.tracks[i], coded.quantiser, goal.origin, tables());
+    }
+    REQUIRE(volumes()[1] < 0.93);
+    refit_volume(window, coded, goal, tables());
+    CHECK(std::fabs(volumes()[1] - 1) < 0.035);
+    CHECK(volumes()[0] == doctest::Approx(large).epsilon(1e-5));
+}
