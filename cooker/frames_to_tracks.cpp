@@ -291,12 +291,15 @@ std::vector<uint32_t> trim_strays(Window& window, const CodedWindow& coded, cons
     return trimmed;
 }
 
-/// Of every sample: those taken out of its mesh, and what coded points do not show.
+/// Of every sample: those taken out of its mesh, what coded points do not show, and the necks that they do not hold.
 std::vector<std::vector<Drop>> drops_of(const Window& window, const CodedWindow& coded, const WindowGoal& goal) {
     std::vector<std::vector<Drop>> drops(window.frames.size());
     parallel_for(drops.size(), goal.jobs, [&](size_t s) {
         const SurfaceFrame& frame = *window.frames[s];
-        drops[s] = lost_drops(frame, decoded_points(coded.decoded, int(s)), repair_beyond * goal.tolerance, goal.tolerance);
+        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s));
+        drops[s] = lost_drops(frame, points, repair_beyond * goal.tolerance, goal.tolerance);
+        const std::vector<Drop> necks = neck_drops(frame, points);
+        drops[s].insert(drops[s].end(), necks.begin(), necks.end());
         drops[s].insert(drops[s].begin(), frame.drops.begin(), frame.drops.end());
     });
     return drops;

@@ -13,6 +13,7 @@
 //   tracks_to_coefficients Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
 //   refit_tracks           coefficients chosen anew, against the surface that all tracks decode to together
 //   refit_volume           heights of the points of small pieces go by a step, until the volume is the source's
+//   necks_to_drops         necks that are torn for all that are held by drops
 //   coefficients_to_layers progressive order, blocks
 //   layers_to_chunks       entropy coding
 //   chunks_to_asset        the file
@@ -66,6 +67,8 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance);
 /// Other small closed pieces of a frame, which its points, as decoded, do not show: most of it is more than `beyond` metres from what
 /// they do. As ellipsoids, however far those are off, no thinner than can be coded within `tolerance` and seen.
 std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, float tolerance);
+/// What hangs on a neck of the source, but not as decoded, is held by a drop.
+std::vector<Drop> neck_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points);
 /// Tracks of the drops of every sample of the window. Those at its first and last go on in the windows beside it, which see the same
 /// frame.
 std::vector<TrackSamples> track_drops(const Window& window, const std::vector<std::vector<Drop>>& drops);

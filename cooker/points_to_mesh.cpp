@@ -53,6 +53,20 @@ PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) {
     surface::finish_field(field);
 }
 
+std::vector<float> PointField::values_at(const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z) const {
+    const auto range = [](const std::vector<float>& v) { return std::minmax_element(v.begin(), v.end()); };
+    std::vector<float> value(x.size());
+    if (x.empty()) return value;
+    const auto [x0, x1] = range(x);
+    const auto [y0, y1] = range(y);
+    const auto [z0, z1] = range(z);
+    std::vector<uint32_t> candidates(field.point_count);
+    const surface::Box box{{*x0, *y0, *z0}, {*x1, *y1, *z1}};
+    const uint32_t found = surface::gather(field, box, candidates.data(), uint32_t(candidates.size()));
+    surface::evaluate(field, candidates.data(), found, x.data(), y.data(), z.data(), uint32_t(value.size()), value.data());
+    return value;
+}
+
 Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs, size_t about) {
     const PointField decoded(points, jobs);
     const uint32_t workers = uint32_t(threads_of(jobs));

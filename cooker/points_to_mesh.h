@@ -15,6 +15,8 @@ public:
     explicit PointField(const std::vector<SurfacePoint>& points, int jobs = 1);
     PointField(const PointField&) = delete;
     surface::Field field;
+    /// Its value at each position, metres: negative in the liquid.
+    std::vector<float> values_at(const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z) const;
 
 private:
     std::vector<float> rows_[10];

@@ -149,29 +149,15 @@ std::vector<SurfacePoint> points_around(const SurfaceFrame& frame, const std::ve
     return around;
 }
 
-/// The field of the points at positions.
-std::vector<float> values_at(const PointField& decoded, const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z) {
-    const auto range = [](const std::vector<float>& v) { return std::minmax_element(v.begin(), v.end()); };
-    const auto [x0, x1] = range(x);
-    const auto [y0, y1] = range(y);
-    const auto [z0, z1] = range(z);
-    std::vector<float> value(x.size());
-    std::vector<uint32_t> candidates(decoded.field.point_count);
-    const surface::Box box{{*x0, *y0, *z0}, {*x1, *y1, *z1}};
-    const uint32_t found = surface::gather(decoded.field, box, candidates.data(), uint32_t(candidates.size()));
-    surface::evaluate(decoded.field, candidates.data(), found, x.data(), y.data(), z.data(), uint32_t(value.size()), value.data());
-    return value;
-}
-
 /// Integral, over the place's liquid and air that the points decode as the other, of its depth: edges, per probe of a least place.
 double confusion(const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points) {
     if (place.x.empty()) return 0;
     const PointField decoded(points);
-    const std::vector<float> value = values_at(decoded, place.x, place.y, place.z);
+    const std::vector<float> value = decoded.values_at(place.x, place.y, place.z);
     double sum = 0, torn = 0;
     for (size_t i = 0; i < value.size(); ++i)
         if ((value[i] < 0) != (place.depth[i] > 0)) sum += std::fabs(place.depth[i]) / frame.edge;
-    if (place.neck && place.neck->is_torn(values_at(decoded, place.neck->x, place.neck->y, place.neck->z), place.torn)) torn = torn_counts;
+    if (place.neck && place.neck->is_torn(decoded.values_at(place.neck->x, place.neck->y, place.neck->z), place.torn)) torn = torn_counts;
     const double apart = place.neck ? neck_spacing / probe_spacing : 1;
     return torn + sum * std::pow(apart * place.radius / (least_radius * frame.edge), 3);
 }
@@ -234,7 +220,7 @@ Trial best_together(const SurfaceFrame& frame, const Place& place, const std::ve
 void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
     const bool all = place.radius > wide * frame.edge;
     std::vector<SurfacePoint> around = all ? points : points_around(frame, points, place.centre);
-    if (place.neck) place.torn = values_at(PointField(around), place.neck->x, place.neck->y, place.neck->z);
+    if (place.neck) place.torn = PointField(around).values_at(place.neck->x, place.neck->y, place.neck->z);
     double now = confusion(frame, place, around);
     const double gain = place.neck ? least_neck_gain : least_gain;
     if (now >= gain) find_candidates(frame, place);  // else no trial could pay: three places of four at fine errors

@@ -26,7 +26,7 @@ constexpr double nearest = 0.5;       // of the largest step
 constexpr double most_missing = 0.5;  // else the piece is torn, or one with another
 constexpr double spoilt = 0.05;       // more amiss than before: that did not do what it should, and is taken back
 constexpr int rounds = 4;             // of steps: what they do is known roughly
-constexpr double enough = 0.7;        // of the most that a step would mend now: others are chosen by what they do to the distances
+constexpr double enough = 0.2;        // of the most that a step would mend now: others are chosen by what they do to the distances
 constexpr double least_harm = 0.05;   // of a step's own square: any that does less is as good
 
 /// A point of a piece: what it stands for, and how far the source is above it.

@@ -32,6 +32,19 @@ inline rill::cooker::Mesh sphere(uint32_t n, float radius, const glm::vec3& cent
 }
 inline rill::cooker::Mesh bumpy_sphere(uint32_t n, float radius, const glm::vec3& centre = {}) { return sphere(n, radius, centre, 0.1f); }
 
+/// Two balls of `ball` edges joined by a neck of `neck` edges along x, as a surface of revolution.
+inline rill::cooker::Mesh dumbbell(float edge, float ball, float neck, float apart) {
+    rill::cooker::Mesh mesh = sphere(96, 1);
+    for (glm::vec3& x : mesh.positions) {
+        const float along = (ball + apart) * x.x, beyond = std::fabs(along) - apart;  // a ball's middle
+        const float at_ball = std::sqrt(std::max(ball * ball - beyond * beyond, 0.f));
+        const float round = beyond > 0 ? at_ball : std::max(at_ball, neck), length = std::sqrt(x.y * x.y + x.z * x.z);
+        const float scale = length > 1e-4f ? round / length : 0;
+        x = edge * glm::vec3(along, scale * x.y, scale * x.z);
+    }
+    return mesh;
+}
+
 /// The square [0, side]² at z = 0, normal +z, n × n cells.
 inline rill::cooker::Mesh plane(uint32_t n, float side) {
     rill::cooker::Mesh mesh;

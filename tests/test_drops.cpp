@@ -253,3 +253,33 @@ TEST_CASE("a drop keeps its volume when it is coded, whatever its axes are round
     CHECK(mean / count == doctest::Approx(1).epsilon(0.005));
     CHECK(std::sqrt(square / count) < 0.022);
 }
+
+TEST_CASE("what hangs on a needle is held by a drop, and what does not hang together stays apart") {
+    constexpr float ball = 3, apart = 3.6f;
+    for (int k = 0; k < 6; ++k) {  // wherever cells lie
+        CAPTURE(k);
+        const glm::vec3 middle = 0.17f * float(k) * edge * glm::vec3(1, 2, 3);
+        Mesh source = dumbbell(edge, ball, 0.1f, apart), two;
+        for (glm::vec3& x : source.positions) x += middle;
+        std::vector<SurfacePoint> points;
+        for (const float side : {-1.f, 1.f}) {
+            const glm::vec3 centre = middle + glm::vec3(side * apart * edge, 0, 0);
+            append(two, sphere(40, ball * edge, centre));
+            for (const glm::vec3& x : sphere(16, ball * edge, centre).positions) points.push_back({x, glm::normalize(x - centre), {}});
+        }
+        CHECK(neck_drops(SurfaceFrame(two, edge), points).empty());
+        const std::vector<Drop> drops = neck_drops(SurfaceFrame(source, edge), points);
+        REQUIRE(drops.size() == 1);
+        CHECK(glm::distance(drops[0].centre, middle) < edge);
+        CHECK(drops[0].shape[0] < 2 * edge);
+        CHECK(drops[0].shape[1] < edge);
+        mesh_test::Cloud cloud;
+        for (const SurfacePoint& p : points) cloud.add({p.position.x, p.position.y, p.position.z}, {p.normal.x, p.normal.y, p.normal.z});
+        CHECK(mesh_test::topology(mesh_test::mesh(mesh_test::RealField(cloud).field, {edge})).euler == 4);  // two balls
+        const glm::vec3& at = drops[0].centre;
+        const auto& shape = drops[0].shape;
+        CHECK(std::fabs(shape[3]) + std::fabs(shape[4]) + std::fabs(shape[5]) < 0.4f * edge);  // along x, nearly
+        cloud.add_drop({at.x, at.y, at.z}, {shape[0], shape[1], shape[2]});
+        CHECK(mesh_test::topology(mesh_test::mesh(mesh_test::RealField(cloud).field, {edge})).euler == 2);  // one
+    }
+}

@@ -154,23 +154,6 @@ TEST_CASE("thin liquid that no single point mends is mended by several at once")
     CHECK(lost.size() < thin.positions.size() / 2);
 }
 
-namespace {
-
-/// Two balls of `ball` edges joined by a neck of `neck` edges along x, as a surface of revolution.
-Mesh dumbbell(float edge, float ball, float neck, float apart) {
-    Mesh mesh = sphere(96, 1);
-    for (glm::vec3& x : mesh.positions) {
-        const float along = (ball + apart) * x.x, beyond = std::fabs(along) - apart;  // a ball's middle
-        const float at_ball = std::sqrt(std::max(ball * ball - beyond * beyond, 0.f));
-        const float round = beyond > 0 ? at_ball : std::max(at_ball, neck), length = std::sqrt(x.y * x.y + x.z * x.z);
-        const float scale = length > 1e-4f ? round / length : 0;
-        x = edge * glm::vec3(along, scale * x.y, scale * x.z);
-    }
-    return mesh;
-}
-
-}  // namespace
-
 TEST_CASE("a neck that is torn is found where it is, and mended") {
     constexpr float edge = 0.05f, ball = 3, apart = 3.6f;
     float neck = 0;
