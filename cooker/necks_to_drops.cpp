@@ -55,7 +55,7 @@ bool is_alone(const Spindle& spindle, uint32_t piece, const SurfaceFrame& frame,
     });
 }
 
-/// What holds the neck; nothing where none of the radii does. `label`: of the source's vertices.
+/// What holds the neck; nothing where none of the radii does. The thinnest where no corner of cells is near enough to tell. `label`: of the source's vertices.
 std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const TornNeck& neck, const DecodedPieces& decoded, const PointField& field) {
     const glm::vec3 from = nearest_of(decoded, neck.pieces[0], neck.middle), to = nearest_of(decoded, neck.pieces[1], neck.middle);
     const float gap = glm::distance(from, to), edge = frame.edge;
