@@ -3,6 +3,7 @@
 // cells hardly ever lie in them. A small ellipsoid from one side to the other holds what hangs on them in that frame.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "pipeline.h"
 #include "points_to_mesh.h"
@@ -41,7 +42,7 @@ struct Spindle {
         Drop drop;
         drop.centre = centre;
         drop.shape = {m[0][0], m[1][1], m[2][2], m[0][1], m[0][2], m[1][2]};
-        drop.volume = 4.18879f * along * across * across;
+        drop.volume = 4 * std::numbers::pi_v<float> / 3 * along * across * across;
         return drop;
     }
 };
@@ -55,7 +56,8 @@ bool is_alone(const Spindle& spindle, uint32_t piece, const SurfaceFrame& frame,
     });
 }
 
-/// What holds the neck; nothing where none of the radii does. The thinnest where no corner of cells is near enough to tell. `label`: of the source's vertices.
+/// What holds the neck; nothing where none of the radii does. The thinnest where no corner of cells is near enough to tell.
+/// `label`: of the source's vertices.
 std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const TornNeck& neck, const DecodedPieces& decoded, const PointField& field) {
     const glm::vec3 from = nearest_of(decoded, neck.pieces[0], neck.middle), to = nearest_of(decoded, neck.pieces[1], neck.middle);
     const float gap = glm::distance(from, to), edge = frame.edge;

@@ -323,18 +323,15 @@ TEST_CASE("small pieces of points have their volume, too, beside a large one tha
     grow_tracks(window, {}, goal);
     CodedWindow coded = code_tracks(window, goal, tables());
     const auto is_small = [](const glm::vec3& x) { return x.x > 0.8f; };
-    const auto volumes = [&] {  // of the large piece and the small one, in the source's
-        std::array<double, 2> ratio{};
-        for (const int sign : {1, -1}) {
-            const Mesh mesh = sign > 0 ? mesh_points(decoded_points(coded.decoded, 5), edge) : frame->mesh;
-            std::array<Mesh, 2> part;
-            for (const Triangle& t : mesh.triangles) part[is_small(mesh.positions[t[0]])].triangles.push_back(t);
-            for (size_t i = 0; i < 2; ++i) {
-                part[i].positions = mesh.positions;
-                ratio[i] = sign > 0 ? signed_volume(part[i]) : ratio[i] / signed_volume(part[i]);
-            }
-        }
-        return ratio;
+    const auto parts = [&](const Mesh& mesh) {  // volumes of the large piece and the small one
+        std::array<Mesh, 2> part;
+        for (Mesh& p : part) p.positions = mesh.positions;
+        for (const Triangle& t : mesh.triangles) part[is_small(mesh.positions[t[0]])].triangles.push_back(t);
+        return std::array{signed_volume(part[0]), signed_volume(part[1])};
+    };
+    const auto volumes = [&] {  // in the source's
+        const auto decoded = parts(mesh_points(decoded_points(coded.decoded, 5), edge)), source = parts(frame->mesh);
+        return std::array{decoded[0] / source[0], decoded[1] / source[1]};
     };
     CHECK(std::fabs(volumes()[1] - 1) < 0.035);
     const double large = volumes()[0];
