@@ -24,10 +24,7 @@ constexpr double most_open = 0.01;      // of the area: |∫ n| of a piece that 
 // In tolerances, of a piece's vertices from its ellipsoid; tolerances have grown by a sixth since .7 and 2.2. (At 1, without the second, long droplets with heads at their ends
 // become spindles; frames 14:41 of dam_break take .7 % more bytes at equal p99, 40:50 of pour_sphere 1.5 % less.)
 constexpr float most_rms = 0.6f, most_off = 1.9f;
-// Cells of an edge cut that share off the volume of an ellipsoid, over the square of its mean radius in edges: .62 (large balls) to .67
-// (pancakes), less of the smallest. (.63: pieces of 4 to 10 cubic edges come out 4 % too large; .58: see README.md, "Drops".)
-constexpr double cut_off = 0.58;
-constexpr double most_larger = 0.15;    // edges; the smallest cannot be met: they have few corners of cells, or none
+constexpr double ball = 4 * std::numbers::pi / 3;
 constexpr float flattest = 0.12f;       // shortest over longest axis
 constexpr float reach = 2;              // edges that a drop may land off where its velocity takes it
 constexpr float most_growth = 2;        // of volume from frame to frame, either way
@@ -76,19 +73,9 @@ struct Fit {
     float least = 0;  ///< no half axis is shorter, metres; nor any too short in the longest: 0: then there is no ellipsoid
 };
 
-/// How many times as large an ellipsoid of that mean radius (edges) has to be for its mesh to have the volume, in its own.
-double enlarged(double radius, double volume) {
-    constexpr double ball = 4 * std::numbers::pi / 3;
-    double scale = 1;
-    for (int round = 0; round < 30; ++round)  // r³ − cut_off r = volume / ball
-        scale = std::cbrt(volume / ball + cut_off * radius * scale) / radius;
-    return scale;
-}
-
-/// The ellipsoid of the piece's centre and second moments, about as large as to go through its vertices on average: it is decoded as
-/// a polyhedron within, like the source's. Cells of an edge cut more off than triangles do, so it is larger by what
-/// that takes (`most_larger`). None where the vertices are farther off.
-std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, const Moments& m, const Fit& fit, float edge) {
+/// The ellipsoid of the piece's centre, second moments and volume; the runtime sees to it that what it draws has that volume. None where the
+/// vertices are farther off.
+std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& triangles, const Moments& m, const Fit& fit) {
     if (!(std::abs(m.volume) > 0)) return {};
     const glm::vec3 base = base_of(mesh, triangles);
     const Eigen::Vector3d centre = m.first / m.volume;
@@ -104,8 +91,8 @@ std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& tria
     const std::vector<uint32_t> vertices = vertices_of(mesh, triangles);
     const double share = 1 / double(vertices.size());
     const auto on_ball = [&](uint32_t v) -> Eigen::Vector3d { return inverse * (eigen(mesh.positions[v] - base) - centre); };
-    double scale = is_thickened, square = 0;
-    for (uint32_t v : vertices) scale += is_thickened ? 0 : share * on_ball(v).norm();
+    const double scale = is_thickened ? 1 : std::cbrt(std::abs(m.volume) / (ball * half.prod()));
+    double square = 0;
     Drop drop;
     for (uint32_t v : vertices) {
         const Eigen::Vector3d q = on_ball(v);
@@ -115,10 +102,6 @@ std::optional<Drop> fit_drop(const Mesh& mesh, const std::vector<uint32_t>& tria
         if (!mesh.velocities.empty()) drop.velocity += float(share) * mesh.velocities[v];
     }
     if (!(std::sqrt(square) <= fit.rms)) return {};
-    if (!is_thickened) {
-        const double radius = std::cbrt(half.prod()) / edge, most = most_larger / radius;
-        scale = std::clamp(enlarged(radius, std::abs(m.volume) / std::pow(double(edge), 3)), scale - most, scale + most);
-    }
     const Eigen::Matrix3d shape = (m.volume < 0 ? -scale : scale) * turn * half.asDiagonal() * turn.transpose();
     drop.centre = base + glm::vec3(centre.x(), centre.y(), centre.z());
     drop.volume = float(m.volume);
@@ -160,11 +143,10 @@ void add_specks(const Mesh& around, std::vector<Drop>& specks, float edge, float
         const SurfaceIndex::Hit hit = index.closest(x, INFINITY);
         return glm::dot(value_at(hit, around.triangles[hit.triangle], normals), x - hit.point) >= 0;
     };
-    constexpr float ball = float(4 * std::numbers::pi / 3);
-    const float least_volume = ball * std::pow(least_radius(edge, tolerance), 3.f), air = float(least_air) * edge * edge * edge;
+    const float least_volume = float(ball) * std::pow(least_radius(edge, tolerance), 3.f), air = float(least_air) * edge * edge * edge;
     for (Drop& speck : specks) {
         speck.volume = is_in_air(speck.centre) ? std::max(speck.volume, least_volume) : -air;
-        const float radius = std::cbrt(speck.volume / ball);
+        const float radius = std::cbrt(speck.volume / float(ball));
         speck.shape = {radius, radius, radius, 0, 0, 0};
         drops.push_back(speck);
     }
@@ -212,7 +194,7 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
         const double volume = piece.moments.volume;
         const float extent = extent_of(mesh, piece.triangles);
         const bool is_small = std::abs(volume) < least_volume, is_speck = (is_small && volume < 0) || extent < 2 * least_speck * edge;
-        const auto drop = is_speck ? std::nullopt : fit_drop(mesh, piece.triangles, piece.moments, {most_rms * tolerance, most_off * tolerance}, edge);
+        const auto drop = is_speck ? std::nullopt : fit_drop(mesh, piece.triangles, piece.moments, {most_rms * tolerance, most_off * tolerance});
         if (drop) drops.push_back(*drop);
         else if (is_speck || (is_small && extent < speck_extent * edge)) specks.push_back(speck_of(mesh, piece.triangles, volume));
         else continue;
@@ -238,7 +220,7 @@ std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<Surfac
         for (uint32_t v : vertices_of(frame.mesh, piece.triangles)) positions.push_back(frame.mesh.positions[v]);
         if (!decoded.triangles.empty() && 2 * find_beyond(index, positions, beyond, 1).size() < positions.size()) continue;
         const Fit any{INFINITY, INFINITY, least_radius(frame.edge, tolerance)};
-        if (const auto drop = fit_drop(frame.mesh, piece.triangles, piece.moments, any, frame.edge)) drops.push_back(*drop);
+        if (const auto drop = fit_drop(frame.mesh, piece.triangles, piece.moments, any)) drops.push_back(*drop);
     }
     return drops;
 }

@@ -7,6 +7,7 @@
 
 #include "pipeline.h"
 #include "points_to_mesh.h"
+#include "surface/field_to_mesh.h"
 #include "torn_necks.h"
 
 namespace rill::cooker {
@@ -14,7 +15,7 @@ namespace {
 
 // Edges.
 constexpr float longest_gap = 3;                    // farther apart, it is no neck
-constexpr float radii[] = {0.6f, 0.75f, 0.9f};      // across it, the first that holds
+constexpr float radii[] = {0.45f, 0.6f, 0.75f};     // across it, the first that holds; drawn larger, for it touches both sides
 constexpr float overlap = 0.6f;                     // into either side
 constexpr float coded_off = 0.1f;                   // as much thinner it still has to hold
 constexpr float apart = 0.8f;                       // from other liquid
@@ -36,6 +37,11 @@ struct Spindle {
         const glm::vec3 r = x - centre;
         const float up = glm::dot(r, axis) / along, out = glm::length(r - axis * glm::dot(r, axis)) / across;
         return (std::sqrt(up * up + out * out) - 1) * across;
+    }
+    /// As cells draw it, and as much thinner.
+    void draw(float edge, float thinner) {
+        const float scale = 1 + most_growth_of_drops * edge / std::cbrt(along * across * across);
+        along = scale * along - thinner, across = scale * across - thinner;
     }
     Drop drop() const {
         const glm::mat3 m = glm::mat3(across) + (along - across) * glm::outerProduct(axis, axis);
@@ -75,7 +81,7 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
         Spindle spindle{0.5f * (from + to), gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1), std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge};
         if (!is_alone(spindle, piece, frame, label)) return {};
         const Drop drop = spindle.drop();
-        spindle.along -= coded_off * edge, spindle.across -= coded_off * edge;
+        spindle.draw(edge, coded_off * edge);
         std::vector<float> held = torn;
         for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], spindle.value({corners.x[i], corners.y[i], corners.z[i]}));
         if (!corners.is_torn(held, torn)) return drop;

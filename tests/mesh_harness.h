@@ -184,7 +184,7 @@ struct Setup {
 };
 
 inline Mesh mesh(const surface::Field& field, const Setup& setup) {
-    const MeshLimits limits{setup.vertices, 0, setup.tiles, setup.workers};
+    const MeshLimits limits{setup.vertices, field.drop_count, setup.tiles, setup.workers};
     const Block memory = exactly(mesher_bytes(limits));
     Mesher* mesher = place_mesher(memory.get(), limits);
     if (setup.access) mesher->access = *setup.access;

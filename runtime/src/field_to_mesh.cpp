@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The mesher's memory and its table of stages. march.cpp finds the surface cells, drop_specks.cpp
 // clears noise from them, cells_to_vertices.cpp places their vertices, vertices_to_normals.cpp gives these their
-// normals, mesh_to_buffers.cpp joins them to triangles in the caller's buffers.
+// normals, mesh_to_buffers.cpp joins them to triangles in the caller's buffers. small_drops.cpp draws what
+// cells are too coarse for.
 #include "surface/field_to_mesh.h"
 
 #include <algorithm>
@@ -47,6 +48,7 @@ size_t carve(void* memory, const MeshLimits& limits, Mesher& m) {
     m.active = carver.take<uint32_t>(limits.tiles);
     m.next_active = carver.take<uint32_t>(limits.tiles);
     m.order = carver.take<OrderedTile>(limits.tiles);
+    m.drops = carver.take<SmallDrop>(limits.drops);
     m.position = carver.take<float>(3 * size_t(limits.vertices));
     m.normal = carver.take<float>(3 * size_t(limits.vertices));
     m.of_field = carver.take<uint8_t>(limits.vertices);
@@ -74,7 +76,8 @@ Mesher* place_mesher(void* memory, const MeshLimits& limits) noexcept {
 namespace {
 
 void start_attempt(Mesher& m) {
-    m.tile_count = m.order_count = m.kept = 0;
+    give_back_drops(m);
+    m.tile_count = m.order_count = m.kept = m.drops_kept = 0;
     m.active_count = m.next_active_count = m.colour = 0;
     m.tiles_ran_out = false, m.seeding = true;
     m.phase = 0;
@@ -106,6 +109,7 @@ uint32_t prepare_layout(void* mesher) {
 }
 
 constexpr Stage phases[] = {
+    {prepare_judge_drops, run_judge_drops, false},
     {prepare_round, run_march, true},
     {prepare_find_specks, run_find_specks, false},
     {prepare_turn_specks, nullptr, false},
@@ -114,6 +118,7 @@ constexpr Stage phases[] = {
     {prepare_vertices, run_vertices, false},
     {prepare_normals, run_normals, false},
     {prepare_quads, run_quads, false},
+    {prepare_small_drops, run_small_drops, false},
     {prepare_ranges, nullptr, false},
 };
 constexpr uint32_t phase_count = sizeof(phases) / sizeof(phases[0]);
@@ -138,6 +143,7 @@ void run_mesh(void* mesher, uint32_t task, uint32_t worker) { static_cast<Mesher
 
 void begin_mesh(Mesher* m, const MeshInput& input) noexcept {
     m->input = input;
+    m->drop_count = 0;
     m->cut = m->vertices_wanted = m->indices_wanted = m->ranges_wanted = 0;
     m->octaves = 0;
     for (uint32_t w = 0; w < m->limits.workers; ++w) m->scratch[w].corners_evaluated = 0;

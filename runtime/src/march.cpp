@@ -76,35 +76,8 @@ void seed_point(Mesher& m, uint32_t i) {
             for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) seed_box(m, disc, disc.level, c);
 }
 
-/// A drop that no corner of the lattice lies in would not be seen, or come and go as it flies: it moves onto the nearest one.
-void show_drop(const Mesher& m, uint32_t i) {
-    constexpr float least = 0.1f, share = 0.5f;  // radius, of a cell: seen at all; where in the drop the corner lies then
-    constexpr int around = 4;                    // corners each way: those of its cell and the next; larger drops nearly always hold one
-    const surface::Field& f = *m.input.field;
-    const float centre[3] = {f.dx[i], f.dy[i], f.dz[i]};
-    int32_t level, tile_coord[3];
-    if (!leaf_at(m, centre, level, tile_coord)) return;
-    const float cell = m.input.levels.cell(level);
-    if (!(std::abs(f.radius[i]) > least * cell && std::abs(f.radius[i]) < cell)) return;
-    float nearest = surface::unsupported, away[3] = {};
-    for (int k = 0; k < around * around * around; ++k) {
-        const int step[3] = {k % around - 1, k / around % around - 1, k / (around * around) - 1};
-        float r[3];
-        for (int a = 0; a < 3; ++a) r[a] = (std::floor(centre[a] / cell) + float(step[a])) * cell - centre[a];
-        const float x = f.inverse[0][i] * r[0] + f.inverse[3][i] * r[1] + f.inverse[4][i] * r[2];
-        const float y = f.inverse[3][i] * r[0] + f.inverse[1][i] * r[1] + f.inverse[5][i] * r[2];
-        const float z = f.inverse[4][i] * r[0] + f.inverse[5][i] * r[1] + f.inverse[2][i] * r[2];
-        const float length = std::sqrt(x * x + y * y + z * z);
-        if (length < nearest) nearest = length, std::copy(r, r + 3, away);
-    }
-    if (!(nearest > 1 - 1e-3f)) return;
-    float* const place[3] = {f.dx + i, f.dy + i, f.dz + i};
-    for (int a = 0; a < 3; ++a) *place[a] += away[a] * (1 - share / nearest);
-}
-
 /// The cells where the six half axes leave the ellipsoid; it is convex, so the march finds the rest.
 void seed_drop(Mesher& m, uint32_t i) {
-    show_drop(m, i);
     const surface::Field& f = *m.input.field;
     constexpr int row[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
     for (int a = 0; a < 6; ++a) {
@@ -354,10 +327,6 @@ void take_colour(Mesher& m) {
     }
 }
 
-bool usable(const MeshInput& input) {
-    return input.field && input.levels.cell_size > 0 && input.levels.cell_size < 1e12f;
-}
-
 }  // namespace
 
 uint32_t prepare_march(void* mesher) {
@@ -366,7 +335,9 @@ uint32_t prepare_march(void* mesher) {
     if (m.seeding) {
         m.uncut = *m.input.field, m.uncut.container = surface::everywhere;
         for (uint32_t i = 0; i < m.input.field->point_count; ++i) seed_point(m, i);
-        for (uint32_t i = 0; i < m.input.field->drop_count; ++i) seed_drop(m, i);
+        change_drops(m);
+        for (uint32_t i = 0; i < m.input.field->drop_count; ++i)
+            if (i >= m.drop_count || m.drops[i].in_cells) seed_drop(m, i);
     } else {
         for (uint32_t i = 0; i < m.active_count; ++i) exchange(m, m.active[i]);
     }

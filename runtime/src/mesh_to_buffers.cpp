@@ -199,6 +199,15 @@ void lay_out(Mesher& m) noexcept {
         room = room && vertices <= most_vertices && indices <= most_indices && ranges <= most_ranges;
         m.kept += room;
     }
+    bool any_drop = false;
+    for (uint32_t i = 0; i < m.drop_count; ++i) {
+        SmallDrop& drop = m.drops[i];
+        if (drop.mesh && !any_drop) ++ranges, any_drop = true;
+        drop.first_vertex = uint32_t(vertices), drop.first_index = uint32_t(indices);
+        vertices += vertices_of(drop), indices += indices_of(drop);
+        room = room && vertices <= most_vertices && indices <= most_indices && ranges <= most_ranges;
+        m.drops_kept += room;
+    }
     if (vertices > most_vertices) m.cut |= cut_vertices;
     if (indices > most_indices) m.cut |= cut_indices;
     if (ranges > most_ranges) m.cut |= cut_ranges;
@@ -232,7 +241,7 @@ void run_quads(void* mesher, uint32_t task, uint32_t) {
 uint32_t prepare_ranges(void* mesher) {
     Mesher& m = *static_cast<Mesher*>(mesher);
     Target* target = m.input.target;
-    if (!target) return 0;
+    if (!target) return give_back_drops(m), 0;
     uint32_t vertices = 0, indices = 0, ranges = 0;
     Range range{};
     for (uint32_t i = 0; i < m.kept; ++i) {
@@ -254,9 +263,20 @@ uint32_t prepare_ranges(void* mesher) {
         if (target->ranges) std::memcpy(target->ranges + ranges, &range, sizeof(range));
         ++ranges, range.index_count = 0;
     }
+    range = {ranges, indices, 0, {HUGE_VALF, HUGE_VALF, HUGE_VALF}, {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF}};
+    for (uint32_t i = 0; i < m.drops_kept; ++i) {
+        vertices += vertices_of(m.drops[i]), range.index_count += indices_of(m.drops[i]);
+        cover(m.drops[i], range);
+    }
+    if (range.index_count) {
+        indices += range.index_count;
+        if (target->ranges) std::memcpy(target->ranges + ranges, &range, sizeof(range));
+        ++ranges;
+    }
     target->vertices_used = vertices;
     target->indices_used = target->indices ? indices : 0;
     target->ranges_used = target->ranges ? ranges : 0;
+    give_back_drops(m);
     return 0;
 }
 

@@ -115,6 +115,14 @@ struct OrderedTile {
     static constexpr uint32_t group_shift = 6;  ///< key >> group_shift names the group
 };
 
+/// One of the field's drops and bubbles, as it was there before it was changed for this attempt. See small_drops.cpp.
+struct SmallDrop {
+    uint32_t mesh;           ///< number of the mesh of its own; 0: none
+    bool in_cells;           ///< cells draw it
+    uint32_t first_vertex, first_index;
+    float centre[3], inverse[6], radius, reach;
+};
+
 struct Mesher {
     MeshLimits limits;
     MeshInput input;
@@ -139,6 +147,8 @@ struct Mesher {
     uint32_t colour;  ///< of the chequerboard, whose tiles run this round
     OrderedTile* order;
     uint32_t order_count, kept;  ///< tiles with surface; how many of them are drawn
+    SmallDrop* drops;            ///< by their number in the field
+    uint32_t drop_count, drops_kept;  ///< drops; how many of them are drawn if they have a mesh, after all tiles
     float* position;             ///< 3 per vertex, as written to the target
     float* normal;               ///< 3 per vertex, of what it lies on
     uint8_t* of_field;           ///< per vertex: its normal is the gradient, not that of walls
@@ -146,7 +156,7 @@ struct Mesher {
 };
 
 /// Tiles a task takes: a tile alone is too little work for an engine's job.
-inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16;
+inline constexpr uint32_t tiles_per_march_task = 2, tiles_per_quick_task = 16, drops_per_task = 64;
 constexpr uint32_t tasks_of(uint32_t tiles, uint32_t per_task) { return (tiles + per_task - 1) / per_task; }
 /// Runs work(tile index in the list) for the tiles of one task.
 template <typename Work>
@@ -164,6 +174,8 @@ uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) n
 /// The leaf that holds a position; false when that is out of reach.
 bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t coord[3]) noexcept;
 float corner_at(const Tile& tile, uint32_t axis, uint32_t corner) noexcept;
+/// Of a cube: at least in part.
+bool in_sight(const Mesher& m, const float centre[3], float half) noexcept;
 /// Puts it into the list of the coming round.
 void queue_tile(Mesher& m, uint32_t tile) noexcept;
 /// Fills m.order with the tiles that have surface.
@@ -180,8 +192,23 @@ void settle_hanging(Tile& tile, const uint16_t hanging[81], const uint16_t need[
 void turn_border_faces(Tile& tile) noexcept;
 
 // march.cpp: field → surface cells
+inline bool usable(const MeshInput& input) { return input.field && input.levels.cell_size > 0 && input.levels.cell_size < 1e12f; }
 uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
+
+// small_drops.cpp: drops that cells are too coarse for
+uint32_t prepare_judge_drops(void* mesher);
+void run_judge_drops(void* mesher, uint32_t task, uint32_t worker);
+/// What was judged comes true in the field: cells see none that have meshes of their own, and show all others.
+void change_drops(Mesher& m) noexcept;
+/// The field has them again as it had them.
+void give_back_drops(Mesher& m) noexcept;
+uint32_t vertices_of(const SmallDrop& drop) noexcept;
+uint32_t indices_of(const SmallDrop& drop) noexcept;
+/// Widens the range's bounds by it.
+void cover(const SmallDrop& drop, Range& range) noexcept;
+uint32_t prepare_small_drops(void* mesher);
+void run_small_drops(void* mesher, uint32_t task, uint32_t worker);
 
 // drop_specks.cpp
 uint32_t prepare_find_specks(void* mesher);

@@ -108,10 +108,11 @@ void lay_out_sets(Arena& arena, Layout& out) {
     for (float*& row : d.shape) row = arena.take_array<float>(out.drop_capacity);
 }
 
+MeshLimits mesh_limits(const Asset& asset, const Limits& limits, const Layout& layout) { return {limits.vertices, layout.drop_capacity, 0, worker_count(asset)}; }
+
 /// Measures or places; both go through here, which is why footprint() is exact.
 Layout lay_out(Arena& arena, const Asset& asset, const Limits& limits) {
     const Directory& d = asset.directory;
-    const MeshLimits mesh{limits.vertices, limits.indices, 0, worker_count(asset)};
     const uint64_t tracks = uint64_t(d.most_point_tracks) + d.most_drop_tracks;
     Layout out{};
     out.player = arena.take_array<Player>(1);
@@ -128,7 +129,7 @@ Layout lay_out(Arena& arena, const Asset& asset, const Limits& limits) {
     lay_out_sets(arena, out);
     out.rows = arena.take(time_rows_bytes(d.basis.longest));
     out.field = arena.take(surface::field_bytes(out.point_capacity, out.drop_capacity));
-    out.mesher = arena.take(mesher_bytes(mesh));
+    out.mesher = arena.take(mesher_bytes(mesh_limits(asset, limits, out)));
     out.heap = arena.take(limits.resident_bytes);
     return out;
 }
@@ -168,7 +169,7 @@ Player* make_player(Asset& asset, const Layout& layout, const Limits& limits, ui
     e.point_capacity = layout.point_capacity;
     e.drop_capacity = layout.drop_capacity;
     player->field_memory = layout.field;
-    player->mesher = place_mesher(layout.mesher, {limits.vertices, limits.indices, 0, worker_count(asset)});
+    player->mesher = place_mesher(layout.mesher, mesh_limits(asset, limits, layout));
     for (Player::Mark* mark :
          {&player->decode_begun, &player->decode_done, &player->mesh_begun, &player->mesh_done})
         mark->player = player;

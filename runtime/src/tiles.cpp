@@ -89,6 +89,8 @@ uint32_t find_tile(const Mesher& m, int32_t level, const int32_t coord[3]) noexc
     return m.hash[slot_of(m, level, coord)] - 1;  // 0 − 1 = no_tile
 }
 
+bool in_sight(const Mesher& m, const float centre[3], float half) noexcept { return sight_of(m, centre, half) != Sight::none; }
+
 bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t coord[3]) noexcept {
     const Levels& levels = m.input.levels;
     const auto place = [&](int32_t at_level) {

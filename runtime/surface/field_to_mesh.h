@@ -13,9 +13,12 @@
 
 namespace rill {
 
+/// In cells: half axes of drops that cells draw are longer by as much at most, for what they cut off.
+inline constexpr float most_growth_of_drops = 0.15f;
+
 struct MeshLimits {
     uint32_t vertices;           ///< scratch capacity, all workers together
-    uint32_t indices;            ///< not used: indices need no scratch, they go straight to the target
+    uint32_t drops;              ///< of fields at most; beyond, cells draw them as they are
     uint32_t tiles;              ///< of 8³ cells; 0: derived from vertices
     uint32_t workers;
 };
@@ -23,8 +26,8 @@ struct FrustumPlanes {
     float planes[6][4];  ///< asset space, inward
 };
 struct MeshInput {
-    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares; drops that no corner
-                                  ///< of a cell lies in are moved by up to a cell, in its memory
+    const surface::Field* field;  ///< finished, or at least alive until the first mesh stage prepares; its drops are changed
+                                  ///< while the stages run, and as they were afterwards
     Levels levels;                ///< sizes of cells
     const FrustumPlanes* views;   ///< none: everything
     uint32_t view_count;
