@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Mesh → the caller's buffers: one quad around every sign-changing lattice edge, cut at whole tiles where
 // capacity ends. An edge belongs to the tile of its lower corner; the other cells around it then lie in
-// tiles earlier in the order, so dropping tiles from its end never leaves a triangle without its vertices.
+// tiles earlier in the order, so dropping tiles from its end never leaves a triangle without its vertices. After all tiles
+// come the drops that have meshes of their own.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -156,6 +157,13 @@ bool same_group(const Mesher& m, uint32_t a, uint32_t b) {
            m.order[a].key >> OrderedTile::group_shift == m.order[b].key >> OrderedTile::group_shift;
 }
 
+/// All drops that have meshes of their own and are drawn are one piece.
+Range range_of_drops(const Mesher& m, uint32_t number, uint32_t first_index) {
+    Range range{number, first_index, 0, {HUGE_VALF, HUGE_VALF, HUGE_VALF}, {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF}};
+    for (uint32_t i = 0; i < m.drops_kept; ++i) range.index_count += indices_of(m.drops[i]), cover(m.drops[i], range);
+    return range;
+}
+
 }  // namespace
 
 bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept {
@@ -263,12 +271,9 @@ uint32_t prepare_ranges(void* mesher) {
         if (target->ranges) std::memcpy(target->ranges + ranges, &range, sizeof(range));
         ++ranges, range.index_count = 0;
     }
-    range = {ranges, indices, 0, {HUGE_VALF, HUGE_VALF, HUGE_VALF}, {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF}};
-    for (uint32_t i = 0; i < m.drops_kept; ++i) {
-        vertices += vertices_of(m.drops[i]), range.index_count += indices_of(m.drops[i]);
-        cover(m.drops[i], range);
-    }
+    range = range_of_drops(m, ranges, indices);
     if (range.index_count) {
+        for (uint32_t i = 0; i < m.drops_kept; ++i) vertices += vertices_of(m.drops[i]);
         indices += range.index_count;
         if (target->ranges) std::memcpy(target->ranges + ranges, &range, sizeof(range));
         ++ranges;
