@@ -5,6 +5,7 @@
 // cost; the others take tracks until what they leave wrong is too little for their cells to show.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "format/layout.h"
@@ -24,7 +25,7 @@ constexpr size_t least_taken = 24;     // tracks in layer 0, where there are so 
 constexpr float least_share = 0.11f;   // of the cost: layer 0
 constexpr float most_share = 0.75f;    // all layers but the last
 constexpr float least_refined = 1.15f;  // times the cost of the layers before
-constexpr uint32_t drops_layer = 1;    // smaller than cells of layer 0
+constexpr uint32_t drops_layer = 1;    // mostly smaller than cells of layer 0; where many are not, its error says so
 
 /// All tracks alive at one looked-at frame.
 struct Look {
@@ -117,19 +118,46 @@ void take_round(const std::vector<Look>& looks, const std::vector<float>& cost, 
     }
 }
 
+/// How far off the surface is, metres, over how much of it.
+struct Off {
+    float distance, area;
+};
+
+/// Drops that are left out are as far off as they are thick.
+void miss_drops(const std::vector<TrackSamples>& tracks, int sample, std::vector<Off>& off) {
+    for (const TrackSamples& track : tracks) {
+        if (!track.drop || sample < track.birth || sample > track.death) continue;
+        const std::array<float, 6>& s = track.shape[size_t(sample - track.birth)];
+        const glm::mat3 shape(s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]);
+        const float radius = std::cbrt(std::fabs(glm::determinant(shape)));
+        off.push_back({radius, 4 * std::numbers::pi_v<float> * radius * radius});
+    }
+}
+
+LayerError error_of(std::vector<Off>& off) {
+    double area = 0, sum = 0, below = 0;
+    for (const Off& at : off) area += at.area, sum += double(at.area) * at.distance;
+    if (!(area > 0)) return {};
+    std::sort(off.begin(), off.end(), [](const Off& one, const Off& other) { return one.distance < other.distance; });
+    const auto p99 = std::find_if(off.begin(), off.end() - 1, [&](const Off& at) { return (below += at.area) >= 0.99 * area; });
+    return {float(sum / area), p99->distance, 0};
+}
+
 /// Error of the taken tracks, on a few frames of the window.
-LayerError measure_taken(const Window& window, const std::vector<TrackSamples>& tracks, const std::vector<bool>& taken, int jobs) {
+LayerError measure_taken(const Window& window, const std::vector<TrackSamples>& tracks, const std::vector<bool>& taken, bool with_drops, int jobs) {
     const size_t looks = (window.frames.size() + measured_stride - 1) / measured_stride;
     std::vector<LayerError> at(looks);
     parallel_for(looks, jobs, [&](size_t look) {
-        const SurfaceFrame& frame = *window.frames[look * measured_stride];
-        const auto points = decoded_points(tracks, int(look * measured_stride), nullptr, &taken);
+        const int sample = int(look * measured_stride);
+        const SurfaceFrame& frame = *window.frames[size_t(sample)];
+        const auto points = decoded_points(tracks, sample, nullptr, &taken);
         const Residual residual = measure_residual(frame, points);
-        double area = 0, sum = 0;
+        std::vector<Off> off;
+        double area = 0;
         for (size_t v = 0; v < residual.distance.size(); ++v)
-            area += frame.area[v], sum += frame.area[v] * std::min(std::fabs(residual.distance[v]), 10 * frame.edge);
-        at[look].mean = area > 0 ? float(sum / area) : 0;
-        at[look].p99 = float(std::min(residual_percentile(frame, residual, 0.99), 10.0 * frame.edge));
+            off.push_back({std::min(std::fabs(residual.distance[v]), 10 * frame.edge), frame.area[v]}), area += frame.area[v];
+        if (!with_drops) miss_drops(tracks, sample, off);
+        at[look] = error_of(off);
         at[look].spacing = points.empty() ? 0 : float(std::sqrt(area / double(points.size())));
     });
     LayerError error;
@@ -168,17 +196,17 @@ Layers assign_layers(const Window& window, const std::vector<TrackSamples>& trac
         for (float spent = cost_of(taken, cost); spent < least || size_t(std::count(taken.begin(), taken.end(), true)) < least_count;
              spent = cost_of(taken, cost))
             if (!take_more(spent == 0 ? 0.15f * least : std::min(least - spent, (growth - 1) * spent))) break;
-        result.error[l] = measure_taken(window, tracks, taken, jobs);
+        result.error[l] = measure_taken(window, tracks, taken, l >= drops_layer, jobs);
         // A cell of this layer's: twice as wide as the next one's.
         const float allowed = format::fine_enough * std::ldexp(window.frames[0]->edge, int(layers - 1 - l));
         for (float spent; l > 0 && result.error[l].p99 > allowed && (spent = cost_of(taken, cost)) < most_share * all;) {
             if (!take_more(std::clamp(std::sqrt(result.error[l].p99 / allowed) - 1, least_step, most_step) * spent)) break;
-            result.error[l] = measure_taken(window, tracks, taken, jobs);
+            result.error[l] = measure_taken(window, tracks, taken, l >= drops_layer, jobs);
         }
         for (size_t i = 0; i < taken.size(); ++i)
             if (taken[i] && result.layer[i] == layers - 1) result.layer[i] = l;
     }
-    result.error[layers - 1] = measure_taken(window, tracks, std::vector<bool>(tracks.size(), true), jobs);
+    result.error[layers - 1] = measure_taken(window, tracks, std::vector<bool>(tracks.size(), true), true, jobs);
     for (size_t i = 0; i < tracks.size(); ++i)
         if (tracks[i].drop) result.layer[i] = std::min(drops_layer, layers - 1);
     return result;

@@ -93,8 +93,6 @@ struct Surplus {
 Surplus measure_surplus(const std::vector<SurfacePoint>& points, int jobs);
 /// The same of places that need not be among the points: `missing` and π where nothing is decoded.
 Surplus measure_places(const std::vector<SurfacePoint>& points, const std::vector<SurfacePoint>& places);
-/// Area-weighted percentile of |distance|.
-double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction);
 
 /// New points where |residual| exceeds `threshold`: worst first, no two closer than half the spacing of the points
 /// that were measured, nor than the tolerance that is cooked for (all metres) gives reason to.

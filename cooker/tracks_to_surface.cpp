@@ -148,19 +148,6 @@ Surplus measure_places(const std::vector<SurfacePoint>& points, const std::vecto
     return result;
 }
 
-double residual_percentile(const SurfaceFrame& frame, const Residual& residual, double fraction) {
-    std::vector<std::pair<float, float>> weighted;
-    double total = 0, sum = 0;
-    for (size_t v = 0; v < residual.distance.size(); ++v) {
-        weighted.emplace_back(std::fabs(residual.distance[v]), frame.area[v]);
-        total += frame.area[v];
-    }
-    std::sort(weighted.begin(), weighted.end());
-    for (const auto& [distance, area] : weighted)
-        if ((sum += area) >= fraction * total) return distance;
-    return weighted.empty() ? 0 : weighted.back().first;
-}
-
 void correct_paths(const SurfaceFrame& frame, const Residual& residual, const std::vector<SurfacePoint>& points,
                    const std::vector<uint32_t>& ids, int sample, float credible, std::vector<Path>& paths, int jobs) {
     constexpr float reach = 0.6f;  // of the support

@@ -287,3 +287,27 @@ TEST_CASE("what hangs on a needle is held by a drop, and what does not hang toge
         CHECK(mesh_test::topology(mesh_test::mesh(mesh_test::RealField(cloud).field, {edge})).euler == 2);  // one
     }
 }
+
+TEST_CASE("layers: drops that are left out are as far off as they are thick") {
+    constexpr float radius = 0.1f;
+    Window window;
+    window.frames = {std::make_shared<SurfaceFrame>(sphere(40, 1), edge)}, window.seconds = {0};
+    std::vector<TrackSamples> tracks;
+    const auto add = [&](const glm::vec3& at) -> TrackSamples& {
+        TrackSamples& track = tracks.emplace_back();
+        track.birth = track.death = 0, track.position = {at};
+        return track;
+    };
+    for (const glm::vec3& x : sphere(20, 1).positions) add(x).normal = {glm::normalize(x)};
+    const auto errors = [&] { return assign_layers(window, tracks, std::vector<float>(tracks.size(), 1), 3, 1).error; };
+    const float bare = errors()[0].p99;
+    CHECK(bare < 0.5f * radius);
+    for (int k = 0; k < 60; ++k) {
+        TrackSamples& drop = add({2 + k, 0, 0});
+        drop.drop = true, drop.shape = {{radius, radius, radius, 0, 0, 0}};
+        // A hundredth of the area that is off is the least that is felt.
+        if (k == 0) CHECK(errors()[0].p99 < 0.5f * radius);
+    }
+    CHECK(errors()[0].p99 == doctest::Approx(radius));
+    CHECK(errors()[1].p99 < 0.5f * radius);
+}

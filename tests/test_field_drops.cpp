@@ -50,6 +50,46 @@ TEST_CASE("bubble: takes liquid away, and a drop may fly in it") {
     CHECK(std::fabs(evaluate(real.field, Vec{0, 1, 0}).value) < 0.01);
 }
 
+TEST_CASE("gather: of many drops those that reach into the box, none else, wherever they are moved") {
+    Random random(9);
+    Cloud cloud;
+    for (int i = 0; i < 500; ++i) {
+        const double r = 0.01 + 0.05 * random() * random();
+        cloud.add_drop({random(), random(), random()}, {r, 0.5 * r, r});
+    }
+    const RealField real(cloud);
+    const surface::Field& f = real.field;
+    REQUIRE(f.drop_count == 500);
+    const auto check = [&] {
+        size_t most = 0;
+        for (int k = 0; k < 100; ++k) {
+            surface::Box box;
+            for (int a = 0; a < 3; ++a) box.lower[a] = float(random()), box.upper[a] = box.lower[a] + float(0.2 * random());
+            std::vector<uint32_t> expected, found(f.drop_count);
+            for (uint32_t d = 0; d < f.drop_count; ++d) {
+                const float at[3] = {f.dx[d], f.dy[d], f.dz[d]};
+                double d2 = 0;
+                for (int a = 0; a < 3; ++a) d2 += std::pow(std::max({box.lower[a] - at[a], at[a] - box.upper[a], 0.f}), 2);
+                if (d2 < double(f.reach[d]) * f.reach[d]) expected.push_back(f.point_count + d);
+            }
+            found.resize(surface::gather(f, box, found.data(), f.drop_count));
+            CHECK(found == expected);
+            most = std::max(most, found.size());
+        }
+        CHECK(most > 10);
+        CHECK(most < 100);
+    };
+    check();
+    for (uint32_t d = 0; d < f.drop_count; ++d) {
+        const uint32_t i = f.drop_source[d];
+        CHECK(f.dx[d] == cloud.drop[0][i]);
+        CHECK(f.inverse[0][d] == doctest::Approx(1 / cloud.shape[0][i]));
+        f.dx[d] += d % 7 ? 0.f : 0.3f, f.reach[d] *= d % 5 ? 1.f : d % 3 ? 2.f : 0.f;
+    }
+    surface::bound_drops(f);
+    check();
+}
+
 TEST_CASE("fading: the surface moves smoothly while a point comes and goes") {
     const double h = 0.15;
     Cloud cloud;

@@ -98,6 +98,22 @@ TEST_CASE("what was written is what is read") {
     CHECK(make_ball(clip) == bytes);  // the same input gives the same bytes
 }
 
+TEST_CASE("room for the mesh: as much surface as there is, however few points it has; no more than a whole number of boxes") {
+    const auto vertices = [](uint32_t points, float cell) {
+        Clip clip;
+        clip.points = points, clip.cell = cell;
+        Opened opened(make_ball(clip));
+        REQUIRE(opened.open() == Status::ok);
+        return double(rill::suggest_limits(opened.asset).vertices);
+    };
+    const double ball = 1.5 * 4 * 3.14159, box = 2 * (3 * 2.2 + 2.2 * 2.2 + 2.2 * 3);  // cells of a mesh; m²
+    CHECK(vertices(600, 0.08f) == 200000);
+    for (const uint32_t points : {100, 600}) CHECK(vertices(points, 0.004f) * 0.004 * 0.004 == doctest::Approx(ball).epsilon(0.5));
+    CHECK(vertices(600, 0.004f) * 0.004 * 0.004 > 0.95 * ball);
+    CHECK(vertices(600, 0.004f) * 0.004 * 0.004 < 3 * box);
+    CHECK(vertices(600, 1e-6f) == 1 << 24);
+}
+
 TEST_CASE("a file cut at any length is refused, and no byte beyond is read") {
     const Bytes whole = make_ball(small_clip());
     for (size_t length = 0; length < whole.size(); ++length) {

@@ -92,7 +92,7 @@ struct ChunkRecord {
     float lower[3], upper[3];   ///< bounds of the surface these tracks carry, over the whole window
     float spacing;              ///< typical distance between neighbouring points, this and coarser layers
     float error_mean;           ///< measured with this layer and all coarser ones, metres, window mean
-    float error_p99;            ///< likewise the 99th percentile
+    float error_p99;            ///< likewise the 99th percentile; missing drops count as far off as they are thick
 };
 /// Bounds of chunks are whole numbers of these, 16 bits, from the low corner of the file's: they may lie well outside them.
 inline double bounds_unit(const Header& h) {

@@ -54,6 +54,8 @@ void lay_out(Arena& arena, const format::Header& h, format::DirectoryTables& tab
 /// Sums of one window that sizes and suggestions come from.
 struct WindowNeed {
     uint64_t points = 0, drops = 0, bytes = 0;
+    uint32_t finest = 0;  ///< layer that has points
+    float spacing = 0;    ///< of points down to there
 };
 WindowNeed need_of(const format::DirectoryTables& tables, const format::WindowRecord& w) {
     WindowNeed need;
@@ -62,8 +64,22 @@ WindowNeed need_of(const format::DirectoryTables& tables, const format::WindowRe
         need.points += c.point_count;
         need.drops += c.drop_count;
         need.bytes += reading_bytes(c) + block_alignment;
+        if (c.point_count && c.layer >= need.finest) need.finest = c.layer, need.spacing = c.spacing;
     }
     return need;
+}
+
+/// Of a mesh in cells of the source's size. A point stands for a square of its spacing, and a surface crosses 1.5 cells for each
+/// face of a cell that it is as large as, averaged over its directions. Where tracks are short that counts many that are not alive at
+/// once: 40 a point are ample then. Few points with much surface are calm liquid, no larger than a few times the box it fills.
+uint64_t vertices_for(const WindowNeed& need, const format::Header& h) {
+    constexpr double cells_per_face = 1.5, ample = 40, folded = 2, per_drop = 60, least = 200000, most = 1 << 24;
+    double box = 0;  // its surface, in faces of a cell
+    for (int a = 0; a < 3; ++a)
+        box += 2 * double(h.upper[a] - h.lower[a]) * double(h.upper[(a + 1) % 3] - h.lower[(a + 1) % 3]) / (double(h.cell_size) * h.cell_size);
+    const double across = double(need.spacing) / h.cell_size, points = double(need.points);
+    const double calm = cells_per_face * std::min(points * across * across, folded * box);
+    return uint64_t(std::clamp(std::max(ample * points, calm) + per_drop * double(need.drops), least, most));
 }
 uint32_t saturate(uint64_t x) { return uint32_t(std::min<uint64_t>(x, UINT32_MAX)); }
 
@@ -79,6 +95,7 @@ void sum_up_windows(Directory& d) {
         d.most_point_tracks = std::max(d.most_point_tracks, saturate(need.points));
         d.most_drop_tracks = std::max(d.most_drop_tracks, saturate(need.drops));
         d.most_chunks = std::max(d.most_chunks, w.chunk_count);
+        d.suggested_vertices = std::max(d.suggested_vertices, vertices_for(need, d.header));
         most_three = std::max(most_three, last_but_one + last + need.bytes);
         last_but_one = last;
         last = need.bytes;

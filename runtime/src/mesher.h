@@ -119,6 +119,7 @@ struct OrderedTile {
 struct SmallDrop {
     uint32_t mesh;           ///< number of the mesh of its own; 0: none
     bool in_cells;           ///< cells draw it
+    float cell, growth;      ///< the size of those, metres; by how much it is enlarged for them
     uint32_t first_vertex, first_index;
     float centre[3], inverse[6], radius, reach;
 };

@@ -42,7 +42,7 @@ struct Directory {
     surface::Container container;        ///< sides of the bounds that the liquid is cut off at
     float layer_error[format::max_layers];  ///< mean over the clip, with this and all coarser layers; falls
     uint32_t most_point_tracks, most_drop_tracks, most_chunks;  ///< of any one window
-    uint64_t suggested_resident_bytes;
+    uint64_t suggested_resident_bytes, suggested_vertices;
 };
 double frame_time(const Directory& directory, uint32_t index) noexcept;
 /// Cells from which on the layer adds nothing that they would show: what is coarser is fine enough. Until then it fades,

@@ -324,15 +324,14 @@ double frame_seconds(const Asset* asset, uint32_t index) noexcept {
 
 // ---- players ----------------------------------------------------------------------------------------
 
-/// A surface has about as many cells as fit between its points squared: 40 vertices a point is ample for a
-/// decoded point's worth of source mesh, and six indices a vertex what a closed mesh has.
+/// A closed mesh has six indices a vertex.
 Limits suggest_limits(const Asset* asset) noexcept {
     if (!asset || asset->phase != Asset::Phase::ready) return {};
     const Directory& d = asset->directory;
     Limits limits{};
     limits.resident_bytes = d.suggested_resident_bytes;
     limits.points = std::max(1u, d.info.most_points);
-    limits.vertices = uint32_t(std::clamp<uint64_t>(uint64_t(d.info.most_points) * 40, 200000, UINT32_MAX / 8));
+    limits.vertices = uint32_t(d.suggested_vertices);
     limits.indices = limits.vertices * 6;
     limits.reads_in_flight = 16;
     return limits;

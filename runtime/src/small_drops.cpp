@@ -155,8 +155,10 @@ bool touches_nothing(const Mesher& m, MesherScratch& s, const Ellipsoid& drop, f
     }
     const uint32_t count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
     if (count > s.most_candidates) return false;
+    // Alone, it is all in the air or all in liquid: one place tells.
+    const uint32_t asked = count > 1 ? directions : 1;
     float own[directions];
-    for (uint32_t k = 0; k < directions; ++k) {
+    for (uint32_t k = 0; k < asked; ++k) {
         float u[3], r[3];
         direction_of(k, u);
         const float reach = 1 / length_of(drop.inverse, u) + gap;
@@ -164,39 +166,37 @@ bool touches_nothing(const Mesher& m, MesherScratch& s, const Ellipsoid& drop, f
         s.x[k] = drop.centre[0] + r[0], s.y[k] = drop.centre[1] + r[1], s.z[k] = drop.centre[2] + r[2];
         own[k] = (length_of(drop.inverse, r) - 1) * drop.radius;
     }
-    m.access.evaluate(*m.input.field, s.candidates, count, s.x, s.y, s.z, directions, s.value);
-    for (uint32_t k = 0; k < directions; ++k)
+    m.access.evaluate(*m.input.field, s.candidates, count, s.x, s.y, s.z, asked, s.value);
+    for (uint32_t k = 0; k < asked; ++k)
         if (!((drop.radius < 0 ? own[k] - s.value[k] : s.value[k] - own[k]) > -same_value * cell)) return false;
     return true;
+}
+
+/// Cells cut off more of a drop than a fine mesh would: as much larger as gives its mesh the volume. `radius`: in cells.
+float growth_for(float radius) {
+    float larger = radius;
+    for (int round = 0; round < 12; ++round) larger = std::cbrt(radius * radius * radius + cut_off * larger);  // R³ − cut_off R = r³
+    return std::min(larger, radius + most_growth_of_drops) / radius;
 }
 
 /// Who draws it, if anybody does.
 void judge(const Mesher& m, MesherScratch& s, uint32_t i) {
     const surface::Field& f = *m.input.field;
     SmallDrop& drop = m.drops[i];
-    drop = {0, false, 0, 0, {f.dx[i], f.dy[i], f.dz[i]}, {}, f.radius[i], f.reach[i]};
+    drop = {0, false, 0, 1, 0, 0, {f.dx[i], f.dy[i], f.dz[i]}, {}, f.radius[i], f.reach[i]};
     for (int k = 0; k < 6; ++k) drop.inverse[k] = f.inverse[k][i];
     int32_t level, tile[3];
     if (!leaf_at(m, drop.centre, level, tile)) return;
-    const float cell = m.input.levels.cell(level);
+    const float cell = drop.cell = m.input.levels.cell(level);
     const Ellipsoid shape(drop);
     const float size = shape.size(), reach = std::max({shape.extent(0), shape.extent(1), shape.extent(2)}) + sight_margin * cell;
     if (!(std::abs(drop.radius) > least_seen * cell && in_sight(m, drop.centre, reach))) return;
     drop.in_cells = !(size < largest * cell && touches_nothing(m, s, shape, cell));
-    if (!drop.in_cells) drop.mesh = mesh_for(size / cell);
+    if (drop.in_cells) drop.growth = growth_for(std::abs(drop.radius) / cell);
+    else drop.mesh = mesh_for(size / cell);
 }
 
 // ---- those that cells draw --------------------------------------------------------------------------
-
-/// Cells cut off more of it than a fine mesh would: as much larger as gives its mesh the volume.
-void enlarge(const surface::Field& f, uint32_t i, float cell) {
-    const float radius = std::abs(f.radius[i]) / cell;
-    float larger = radius;
-    for (int round = 0; round < 12; ++round) larger = std::cbrt(radius * radius * radius + cut_off * larger);  // R³ − cut_off R = r³
-    const float scale = std::min(larger, radius + most_growth_of_drops) / radius;
-    for (float* const row : f.inverse) row[i] /= scale;
-    f.radius[i] *= scale, f.reach[i] *= scale;
-}
 
 /// One that no corner of the lattice lies in would not be seen, or come and go as it flies: it moves onto the nearest one.
 void move_to_corner(const surface::Field& f, uint32_t i, float cell) {
@@ -274,25 +274,27 @@ void change_drops(Mesher& m) noexcept {
     const surface::Field& f = *m.input.field;
     for (uint32_t i = 0; i < m.drop_count; ++i) {
         const SmallDrop& drop = m.drops[i];
-        int32_t level, tile[3];
         if (!drop.in_cells) {
             f.reach[i] = 0;
-        } else if (leaf_at(m, drop.centre, level, tile)) {
-            const float cell = m.input.levels.cell(level);
-            enlarge(f, i, cell);
-            if (std::abs(drop.radius) < cell) move_to_corner(f, i, cell);
+            continue;
         }
+        for (float* const row : f.inverse) row[i] /= drop.growth;
+        f.radius[i] *= drop.growth, f.reach[i] *= drop.growth;
+        if (std::abs(drop.radius) < drop.cell) move_to_corner(f, i, drop.cell);
     }
+    surface::bound_drops(f);
 }
 
 void give_back_drops(Mesher& m) noexcept {
+    if (!m.drop_count) return;
+    const surface::Field& f = *m.input.field;
     while (m.drop_count) {
-        const surface::Field& f = *m.input.field;
         const uint32_t i = --m.drop_count;
         const SmallDrop& drop = m.drops[i];
         f.dx[i] = drop.centre[0], f.dy[i] = drop.centre[1], f.dz[i] = drop.centre[2], f.radius[i] = drop.radius, f.reach[i] = drop.reach;
         for (int k = 0; k < 6; ++k) f.inverse[k][i] = drop.inverse[k];
     }
+    surface::bound_drops(f);
 }
 
 uint32_t vertices_of(const SmallDrop& drop) noexcept {

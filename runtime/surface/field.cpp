@@ -14,7 +14,7 @@ namespace {
 size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
 
 uint32_t bundles_of(uint32_t count) { return (count + lanes - 1) / lanes; }
-constexpr uint32_t point_rows = 13, drop_rows = 15, bundle_rows = 13;
+constexpr uint32_t point_rows = 13, drop_rows = 15, drop_bundle_rows = 6, bundle_rows = 13;
 size_t bundle_bytes(uint32_t bundles) { return bundle_rows * aligned((bundles + lanes) * sizeof(float)); }
 
 struct Carver {
@@ -42,6 +42,11 @@ void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
                              &field.radius, &field.reach, &field.drop_activity};
     for (float** array : drop_arrays) *array = carver.take<float>(drops);
     for (float*& array : field.inverse) array = carver.take<float>(drops);
+    field.drop_source = carver.take<uint32_t>(drops);
+    for (int a = 0; a < 3; ++a) {
+        field.drops_lower[a] = carver.take<float>(bundles_of(drops));
+        field.drops_upper[a] = carver.take<float>(bundles_of(drops));
+    }
     carve_bundles(field.bundles, carver, bundles_of(points));
     carve_bundles(field.groups, carver, bundles_of(bundles_of(points)));
 }
@@ -220,31 +225,47 @@ void widen_bundles(Field& f) {
     });
 }
 
-/// Ellipsoid {c + S u}: stores S⁻¹, so that |S⁻¹ r| = 1 on the surface. A flat, indefinite or broken S is skipped. That of a
-/// bubble is negative: so is its radius then, which turns the field over.
-void place_drops(Field& f, const format::DropSet& drops) {
-    f.drop_count = 0;
-    for (uint32_t i = 0; i < drops.count; ++i) {
-        float s[6];
+/// The symmetric matrix S of an ellipsoid {c + S u}, as xx yy zz xy xz yz, and what its inverse is made of.
+struct Shape {
+    float s[6], cofactor[6], determinant, size;
+    Shape(const format::DropSet& drops, uint32_t i) {
         for (int k = 0; k < 6; ++k) s[k] = drops.shape[k][i];
         const float xx = s[0], yy = s[1], zz = s[2], xy = s[3], xz = s[4], yz = s[5];
-        const float c0 = yy * zz - yz * yz, c1 = xz * yz - xy * zz, c2 = xy * yz - yy * xz;
-        const float determinant = xx * c0 + xy * c1 + xz * c2;
-        const float size = std::sqrt(xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz));
-        const bool definite = xx * yy > xy * xy && xx * determinant > 0;
-        if (!definite || !(std::fabs(determinant) > 1e-4f * size * size * size) || !std::isfinite(determinant) ||
-            !std::isfinite(drops.x[i] + drops.y[i] + drops.z[i]) || !(drops.activity[i] > 0)) continue;
-        const uint32_t at = f.drop_count++;
-        const float k = 1 / determinant;
-        const float inverse[6] = {c0 * k, (xx * zz - xz * xz) * k, (xx * yy - xy * xy) * k,
-                                  c1 * k, c2 * k, (xy * xz - xx * yz) * k};
+        const float of[6] = {yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy, xz * yz - xy * zz, xy * yz - yy * xz, xy * xz - xx * yz};
+        std::copy(of, of + 6, cofactor);
+        determinant = xx * cofactor[0] + xy * cofactor[3] + xz * cofactor[4];
+        size = std::sqrt(xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz));
+    }
+    /// Neither flat, indefinite nor broken.
+    bool is_sound() const {
+        return cofactor[2] > 0 && s[0] * determinant > 0 && std::fabs(determinant) > 1e-4f * size * size * size && std::isfinite(determinant);
+    }
+};
+
+/// As points are: those that are sound, each sixteen near each other.
+void sort_drops(Field& f, const format::DropSet& drops) {
+    f.drop_count = 0;
+    for (uint32_t i = 0; i < drops.count; ++i)
+        if (std::isfinite(drops.x[i] + drops.y[i] + drops.z[i]) && drops.activity[i] > 0 && Shape(drops, i).is_sound())
+            f.drop_source[f.drop_count++] = i;
+    const float* const position[3] = {drops.x, drops.y, drops.z};
+    divide(position, f.drop_source, f.drop_count, reinterpret_cast<uint32_t*>(f.dx));  // three rows in one, not placed yet
+}
+
+/// Stores S⁻¹, so that |S⁻¹ r| = 1 on the surface. The S of a bubble is negative: so is its radius then, which turns the field
+/// over.
+void place_drops(Field& f, const format::DropSet& drops) {
+    for (uint32_t at = 0; at < f.drop_count; ++at) {
+        const uint32_t i = f.drop_source[at];
+        const Shape shape(drops, i);
+        const float k = 1 / shape.determinant;
         // A drop that is born or dies grows and shrinks with its activity.
         const float grow = 1 / std::cbrt(std::max(std::min(drops.activity[i], 1.f), 1e-3f));
-        for (int a = 0; a < 6; ++a) f.inverse[a][at] = inverse[a] * grow;
+        for (int a = 0; a < 6; ++a) f.inverse[a][at] = shape.cofactor[a] * k * grow;
         f.dx[at] = drops.x[i], f.dy[at] = drops.y[i], f.dz[at] = drops.z[i];
         f.dvx[at] = drops.vx[i], f.dvy[at] = drops.vy[i], f.dvz[at] = drops.vz[i];
-        f.radius[at] = std::cbrt(determinant) / grow;
-        f.reach[at] = 1.5f * size;
+        f.radius[at] = std::cbrt(shape.determinant) / grow;
+        f.reach[at] = 1.5f * shape.size;
         f.drop_activity[at] = drops.activity[i];
     }
 }
@@ -253,7 +274,8 @@ void place_drops(Field& f, const format::DropSet& drops) {
 
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
     return aligned(points * sizeof(Patch)) + point_rows * aligned((points + lanes) * sizeof(float)) +
-           aligned(points * sizeof(uint32_t)) + drop_rows * aligned(drops * sizeof(float)) +
+           aligned(points * sizeof(uint32_t)) + (drop_rows + 1) * aligned(drops * sizeof(float)) +
+           drop_bundle_rows * aligned(bundles_of(drops) * sizeof(float)) +
            bundle_bytes(bundles_of(points)) + bundle_bytes(bundles_of(bundles_of(points)));
 }
 
@@ -265,7 +287,9 @@ void begin_field(Field& field, void* memory, const format::PointSet& points, con
     carve(field, {static_cast<uint8_t*>(memory)}, points.count, drops.count);
     sort_points(field, points);
     begin_bundles(field);
+    sort_drops(field, drops);
     place_drops(field, drops);
+    bound_drops(field);
 }
 
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
@@ -280,6 +304,20 @@ void finish_field(Field& f) noexcept {
     join_discs(f);
     widen_bundles(f);
     for (uint32_t i = 0; i < f.point_count; ++i) f.largest_support = std::max(f.largest_support, f.support[i]);
+}
+
+void bound_drops(const Field& f) noexcept {
+    constexpr float more = 1.0001f, rounding = 1e-6f;  // so that rounding loses none
+    const float* const position[3] = {f.dx, f.dy, f.dz};
+    for (uint32_t k = 0; k < bundles_of(f.drop_count); ++k)
+        for (int a = 0; a < 3; ++a) {
+            float lower = 1e30f, upper = -1e30f;
+            for (uint32_t i = lanes * k; i < std::min(lanes * (k + 1), f.drop_count); ++i) {
+                const float p = position[a][i], reach = more * f.reach[i] + rounding * std::fabs(p);
+                lower = std::min(lower, p - reach), upper = std::max(upper, p + reach);
+            }
+            f.drops_lower[a][k] = lower, f.drops_upper[a][k] = upper;
+        }
 }
 
 }  // namespace rill::surface

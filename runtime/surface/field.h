@@ -55,8 +55,10 @@ struct Field {
     float* area;                           ///< that the point stands for, over 4π, for the winding number
     float *vx, *vy, *vz;
     uint32_t* source;                      ///< index in the PointSet each came from
-    // Drops as they came, with inverse shape and mean radius, negative for bubbles.
+    // Drops, sorted likewise, with inverse shape and mean radius, negative for bubbles.
     float *dx, *dy, *dz, *inverse[6], *radius, *reach, *drop_activity, *dvx, *dvy, *dvz;
+    uint32_t* drop_source;                 ///< index in the DropSet each came from
+    float *drops_lower[3], *drops_upper[3];  ///< box of each sixteen drops with all they reach: bound_drops()
     Bundles bundles, groups;               ///< of points; of bundles
     float spacing;                         ///< about the distance of points
     Container container = everywhere;           ///< as given to begin_field()
@@ -75,6 +77,9 @@ void begin_field(Field& field, void* memory, const format::PointSet& points, con
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
 /// Step 3, one thread: bundles, largest support.
 void finish_field(Field& field) noexcept;
+
+/// After drops have been moved or their reach changed, one thread: gather() finds them by this. begin_field() does it too.
+void bound_drops(const Field& field) noexcept;
 
 /// Patches and drops whose weight can be non-zero somewhere in the box, ascending; drops are numbered
 /// from field.point_count on. Returns how many there are; writes at most `capacity` of them (when the

@@ -151,20 +151,33 @@ void evaluate_all(const Field& f, const uint32_t* candidates, uint32_t count, co
     cut_at_walls(f, position, n, out);
 }
 
+bool touches_drops(const Field& f, uint32_t bundle, const Box& box) {
+    bool apart = false;
+    for (int a = 0; a < 3; ++a) apart |= box.upper[a] < f.drops_lower[a][bundle] || box.lower[a] > f.drops_upper[a][bundle];
+    return !apart;
+}
+
+bool is_reached(const Field& f, uint32_t drop, const Box& box) {
+    const float p[3] = {f.dx[drop], f.dy[drop], f.dz[drop]};
+    float d2 = 0;
+    for (int a = 0; a < 3; ++a) {
+        const float r = std::max({box.lower[a] - p[a], p[a] - box.upper[a], 0.f});
+        d2 += r * r;
+    }
+    return d2 < f.reach[drop] * f.reach[drop];
+}
+
 }  // namespace
 
 uint32_t gather(const Field& f, const Box& box, uint32_t* out, uint32_t capacity) noexcept {
     uint32_t found = f.kernels->gather(f, box.lower, box.upper, out, capacity);
-    for (uint32_t d = 0; d < f.drop_count; ++d) {
-        const float p[3] = {f.dx[d], f.dy[d], f.dz[d]};
-        float d2 = 0;
-        for (int a = 0; a < 3; ++a) {
-            const float r = std::max({box.lower[a] - p[a], p[a] - box.upper[a], 0.f});
-            d2 += r * r;
+    for (uint32_t first = 0; first < f.drop_count; first += lanes) {
+        if (!touches_drops(f, first / lanes, box)) continue;
+        for (uint32_t d = first; d < std::min(first + lanes, f.drop_count); ++d) {
+            if (!is_reached(f, d, box)) continue;
+            if (found < capacity) out[found] = f.point_count + d;
+            ++found;
         }
-        if (!(d2 < f.reach[d] * f.reach[d])) continue;
-        if (found < capacity) out[found] = f.point_count + d;
-        ++found;
     }
     return found;
 }
