@@ -100,6 +100,15 @@ nlohmann::json to_json(const Pass& pass) {
             {"output_hash", hash}};
 }
 
+/// Frames that did not fit: what they show depends on what was drawn before.
+size_t frames_cut(const std::vector<Pass>& passes) {
+    constexpr uint32_t room = cut_points | cut_vertices | cut_indices | cut_ranges;
+    size_t count = 0;
+    for (const Pass& pass : passes)
+        for (const BenchFrame& f : pass.frames) count += (f.cut & room) != 0;
+    return count;
+}
+
 void print(const Pass& pass) {
     std::printf("%-9s %4d ", pass.name.c_str(), pass.jobs);
     for (int s = 0; s < stage_count; ++s) std::printf(s == stage_processor ? " %9.0f" : " %7.0f", pass.mean(Stage(s)));
@@ -231,6 +240,8 @@ int bench_command(const BenchOptions& options) {
         std::printf("output %s; %llu allocations in frames; %s read cold; peak memory %s\n", same ? "identical in all passes" : "DIFFERS between passes",
                     static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
                     readable_bytes(memory["peak_bytes"].get<double>()).c_str());
+        if (const size_t narrow = frames_cut(passes); narrow > 0)
+            std::printf("%zu frames did not fit into the buffers that are suggested: their cells are larger, and depend on the frames before\n", narrow);
         for (const ScreenError& e : far)
             std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles in %.1f ms, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
                         double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.microseconds / 1000, e.mean, e.p99, e.max);
