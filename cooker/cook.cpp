@@ -139,9 +139,8 @@ double duration(const SequenceInfo& info) {
 /// What every part and the asset say of the cook.
 /// As format::Header::walls.
 uint32_t header_walls(const Survey& survey) {
-    const uint32_t sharp = survey.walls & closed_sides(survey.cut, survey.lower, survey.upper);
     const uint32_t bevel = uint32_t(std::lround(survey.bevel / survey.edge * float(format::bevel_parts)));
-    return survey.walls | sharp << format::sharp_rims_shift | std::min(bevel, format::every_bevel) << format::bevel_shift;
+    return survey.walls | survey.sharp << format::sharp_rims_shift | std::min(bevel, format::every_bevel) << format::bevel_shift;
 }
 
 nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Survey& survey, const Aim& aim) {

@@ -39,20 +39,24 @@ std::vector<size_t> samples_of(const std::vector<FrameFacts>& facts, size_t most
     return samples;
 }
 
-/// Of the edges between walls that the liquid was not cut off at.
-float measure_bevel(const SequenceReader& reader, const std::vector<FrameFacts>& facts, const Survey& survey, int jobs) {
-    const uint32_t walls = survey.walls & ~closed_sides(survey.cut, survey.lower, survey.upper);
+/// How surface leaves the walls: those that the liquid was cut off at are sharp, of the others it is measured, like the bevel between them.
+void measure_rims(const SequenceReader& reader, const std::vector<FrameFacts>& facts, Survey& survey, int jobs) {
+    survey.sharp = survey.walls & closed_sides(survey.cut, survey.lower, survey.upper);
+    const uint32_t walls = survey.walls & ~survey.sharp;
     const surface::Container container = surface::container_of(&survey.lower.x, &survey.upper.x, walls, survey.edge);
     const std::vector<size_t> samples = samples_of(facts, measured);
     std::vector<std::vector<BevelFacet>> found(samples.size());
+    std::vector<RimFacts> rims(samples.size());
     if (walls) parallel_for(samples.size(), jobs, [&](size_t k) {
         Mesh mesh = reader.read_surface(samples[k]);
         close_at_sides(mesh, survey.cut);
-        found[k] = bevel_facets(mesh, container, survey.edge);
+        found[k] = bevel_facets(mesh, container, survey.edge), rims[k] = rim_facts(mesh, container, survey.edge);
     });
+    for (size_t k = 1; k < rims.size(); ++k) rims[0].add(rims[k]);
+    if (!rims.empty()) survey.sharp |= rims[0].sharp_walls();
     std::vector<BevelFacet> all;
     for (const auto& facets : found) all.insert(all.end(), facets.begin(), facets.end());
-    return bevel_legs(all, survey.edge);
+    survey.bevel = bevel_legs(all, survey.edge);
 }
 
 /// What will disappoint, and what to do about it.
@@ -84,7 +88,7 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
 json vector_json(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 json to_json(const Survey& s) {
-    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls}, {"wall_share", s.wall_share}, {"bevel", s.bevel},
+    return {{"lower", vector_json(s.lower)}, {"upper", vector_json(s.upper)}, {"edge", s.edge}, {"walls", s.walls}, {"wall_share", s.wall_share}, {"sharp", s.sharp}, {"bevel", s.bevel},
             {"cut", cut_json(s.cut)}, {"triangles", s.triangles}, {"vertices", s.vertices},
             {"velocity", {{"meaning", int(s.fit.meaning)}, {"factor", s.fit.factor}, {"still", s.fit.still},
                           {"as_stored", s.fit.as_stored}, {"carried", s.fit.carried}, {"conclusive", s.fit.conclusive}}}};
@@ -93,7 +97,7 @@ json to_json(const Survey& s) {
 Survey from_json(const json& j) {
     Survey s;
     for (int a = 0; a < 3; ++a) s.lower[a] = j.at("lower").at(size_t(a)), s.upper[a] = j.at("upper").at(size_t(a));
-    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.bevel = j.at("bevel"), s.cut = cut_from_json(j.at("cut")), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
+    s.edge = j.at("edge"), s.walls = j.at("walls"), s.wall_share = j.at("wall_share"), s.sharp = j.at("sharp"), s.bevel = j.at("bevel"), s.cut = cut_from_json(j.at("cut")), s.triangles = j.at("triangles"), s.vertices = j.at("vertices");
     const json& v = j.at("velocity");
     s.fit.meaning = VelocityMeaning(v.at("meaning").get<int>()), s.fit.factor = v.at("factor"), s.fit.still = v.at("still");
     s.fit.as_stored = v.at("as_stored"), s.fit.carried = v.at("carried"), s.fit.conclusive = v.at("conclusive");
@@ -104,7 +108,7 @@ Survey from_json(const json& j) {
 json kept_survey(const std::string& file, const std::string& states, const ReadOptions& options) {
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
-    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 5) return nullptr;
+    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 6) return nullptr;
     const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
@@ -153,7 +157,7 @@ Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<v
     const WallFacts walls = walls_of(facts, edge);
     result.edge = edge, result.lower = walls.lower, result.upper = walls.upper, result.walls = walls.walls(edge);
     result.wall_share = walls.share(result.walls);
-    result.bevel = measure_bevel(reader, facts, result, jobs);
+    measure_rims(reader, facts, result, jobs);
     inspect(reader, facts, result.cut, jobs, warn);
     return result;
 }
@@ -192,7 +196,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 5}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 6}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

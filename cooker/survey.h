@@ -18,6 +18,7 @@ struct Survey {
     float edge = 1;                       ///< median edge, metres
     uint32_t walls = 0;                   ///< as format::Header
     double wall_share = 0;                ///< of the surface of all frames: lies in them
+    uint32_t sharp = 0;                   ///< walls that surface leaves at a crease, likewise
     float bevel = 0;                      ///< metres, as surface::Container
     Cut cut;                              ///< all else is of frames closed there
     double triangles = 0, vertices = 0;   ///< of all frames together

@@ -16,6 +16,15 @@ constexpr double least_share = 0.01;     // of all surface: less are drops and c
 constexpr float least_steep = 0.6f, least_legs = 0.1f, most_legs = 2;
 constexpr float alike_within = 0.05f, least_alike = 0.6f;
 
+// Rims: the share of them that are creases where they are sharp, and of a normal beyond a crease along the wall's. Of the splashes of one mesher none
+// is a crease, of boxes with waves on top all are.
+constexpr double least_sharp = 0.8;
+constexpr float most_along = 0.5f;
+// Edges that liquid goes on through a wall with sharp rims, along its own surface, so that what it is rounded to there is out of sight.
+// (A pool of waves under a spray, default error: by .2 tolerances as elsewhere rims are ragged, the largest error is 7.7 edges, 2: 4.9, 4: .9, for as
+// many bytes within 3 %.)
+constexpr float beyond_rims = 4;
+
 struct Side {
     int axis;
     float place, outward;
@@ -133,13 +142,71 @@ float bevel_legs(std::vector<BevelFacet> facets, float edge) {
     return alike > least_alike * all ? facets[median].legs : 0;
 }
 
-void push_through_walls(Mesh& mesh, const surface::Container& container, float edge, float by) {
-    const std::vector<uint8_t> flat = flat_vertices(mesh, container, edge);
+void RimFacts::add(const RimFacts& other) {
+    for (int s = 0; s < 6; ++s) all[s] += other.all[s], sharp[s] += other.sharp[s];
+}
+
+uint32_t RimFacts::sharp_walls() const {
+    uint32_t walls = 0;
+    for (int s = 0; s < 6; ++s) walls |= uint32_t(all[s] > 0 && sharp[s] > least_sharp * all[s]) << s;
+    return walls;
+}
+
+RimFacts rim_facts(const Mesh& mesh, const surface::Container& container, float edge) {
+    RimFacts facts;
     for (int s = 0; s < 6; ++s) {
         const Side side = side_of(s, container);
+        if (std::fabs(side.place) >= surface::unsupported) continue;
+        std::vector<uint64_t> rims;  // edges of what lies in the wall, as they go round the triangles beyond
+        const auto edge_of = [](uint32_t from, uint32_t to) { return uint64_t(from) << 32 | to; };
+        const auto is_in_wall = [&](const Triangle& t) { return lies_in(mesh, t, side, flat_within * edge); };
+        for (const Triangle& t : mesh.triangles)
+            for (size_t k = 0; k < 3 && is_in_wall(t); ++k) rims.push_back(edge_of(t[(k + 1) % 3], t[k]));
+        std::sort(rims.begin(), rims.end());
+        for (const Triangle& t : mesh.triangles) {
+            if (rims.empty() || is_in_wall(t)) continue;
+            const glm::vec3 a = mesh.positions[t[0]], normal = unit_normal(glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a));
+            for (size_t k = 0; k < 3; ++k) {
+                if (!std::binary_search(rims.begin(), rims.end(), edge_of(t[k], t[(k + 1) % 3]))) continue;
+                const double length = glm::distance(mesh.positions[t[k]], mesh.positions[t[(k + 1) % 3]]);
+                facts.all[s] += length, facts.sharp[s] += std::fabs(normal[side.axis]) < most_along ? length : 0;
+            }
+        }
+    }
+    return facts;
+}
+
+/// Where vertices of sharp rims go, per metre outward: along the free surface.
+glm::vec3 outward_along(const glm::vec3& normal, const Side& side) {
+    constexpr float steepest = 1;
+    glm::vec3 outward(0), along(0);
+    outward[side.axis] = side.outward;
+    const float across = normal[side.axis] * side.outward, flat = 1 - across * across;
+    if (!(flat > 0.3f)) return outward;
+    along = (outward - across * normal) / flat;
+    for (int a = 0; a < 3; ++a) along[a] = a == side.axis ? side.outward : glm::clamp(along[a], -steepest, steepest);
+    return along;
+}
+
+void push_through_walls(Mesh& mesh, const surface::Container& container, float edge, float by) {
+    const std::vector<uint8_t> flat = flat_vertices(mesh, container, edge);
+    std::vector<glm::vec3> free(mesh.positions.size(), glm::vec3(0));  // ∫ n of triangles that lie in no wall
+    if (container.sharp)
+        for (const Triangle& t : mesh.triangles) {
+            if (flat[t[0]] & flat[t[1]] & flat[t[2]]) continue;
+            const glm::vec3 a = mesh.positions[t[0]], across = glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a);
+            for (uint32_t v : t) free[v] += across;
+        }
+    for (int s = 0; s < 6; ++s) {
+        const Side side = side_of(s, container);
+        const bool sharp = container.sharp >> s & 1;
+        const float far = sharp ? beyond_rims * edge : by;
         for (size_t v = 0; v < flat.size(); ++v) {
+            if (!(flat[v] >> s & 1)) continue;
             float& x = mesh.positions[v][side.axis];
-            if (flat[v] >> s & 1) x = std::fabs(x - side.place) <= flat_within * edge ? side.place + side.outward * by : x + side.outward * by;
+            if (std::fabs(x - side.place) <= flat_within * edge) x = side.place;
+            if (sharp && free[v] != glm::vec3(0)) mesh.positions[v] += far * outward_along(unit_normal(free[v]), side);
+            else x += side.outward * far;
         }
     }
 }

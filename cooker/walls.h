@@ -33,11 +33,20 @@ struct BevelFacet {
 std::vector<BevelFacet> bevel_facets(const Mesh& mesh, surface::Container container, float edge);
 /// What most of them have in common: metres. 0: nothing, or there are none.
 float bevel_legs(std::vector<BevelFacet> facets, float edge);
+/// Edges at which surface leaves a wall, of one frame or of many: metres, and how many of them are creases of more than 60°.
+struct RimFacts {
+    double all[6] = {}, sharp[6] = {};
+    void add(const RimFacts& other);
+    /// Walls that surface leaves at once nearly everywhere, not over a bevel or a round, as format::Header::walls.
+    uint32_t sharp_walls() const;
+};
+RimFacts rim_facts(const Mesh& mesh, const surface::Container& container, float edge);
 /// The side of a box, among `sides`, that something is missing in beyond an open edge: the edge lies in it. Along an
 /// edge of the box, the side that its triangle stands across. -1: there is none. `edge`: the mesh's median edge.
 int side_cut_at(const Mesh& mesh, const OpenEdge& e, uint32_t sides, const glm::vec3& lower, const glm::vec3& upper, float edge);
 
-/// What lies flat in a wall goes `by` metres beyond it, and so do the edge where it ends and the bevels to other walls. Bytes at equal p99, one
+/// What lies flat in a wall goes `by` metres beyond it, and so do the edge where it ends and the bevels to other walls. Walls with sharp rims: four
+/// edges, along the free surface. Bytes at equal p99, one
 /// window of `dam_break` and of `drop_splash`, and at equal mean error, against surfaces that are not cut: by 0, .15, .25, .35 and .5
 /// tolerances −2.1, −2.2, −1.9, −1.3, +.8 and −1.1, −1.6, −.7, −2.3, −.4 %; −9, −18, −19, −19, −19 and −8, −15, −15, −17, −16 %.
 void push_through_walls(Mesh& mesh, const surface::Container& container, float edge, float by);

@@ -50,6 +50,29 @@ Mesh bevelled_tank(double seconds, float legs) {
             }
     return mesh;
 }
+/// A pool of 2 × 2 m, as a height field with sides and floor: its rims are edges of the mesh.
+Mesh pool(uint32_t n) {
+    Mesh mesh;
+    const auto height = [](float x, float y) { return 0.5f + 0.1f * std::sin(3 * x + 2 * y); };
+    for (const bool floor : {false, true})
+        for (uint32_t i = 0; i <= n * n + 2 * n; ++i) {
+            const float x = 2 * float(i % (n + 1)) / float(n) - 1, y = 2 * float(i / (n + 1)) / float(n) - 1;
+            mesh.positions.push_back({x, y, floor ? -0.5f : height(x, y)});
+        }
+    const uint32_t floor = (n + 1) * (n + 1);
+    const auto quad = [&](uint32_t a, uint32_t b, uint32_t c, uint32_t d) { mesh.triangles.push_back({a, b, c}), mesh.triangles.push_back({a, c, d}); };
+    for (uint32_t y = 0; y < n; ++y)
+        for (uint32_t x = 0; x < n; ++x) {
+            const uint32_t a = x + y * (n + 1), b = a + 1, c = b + n + 1, d = a + n + 1;
+            quad(a, b, c, d), quad(d + floor, c + floor, b + floor, a + floor);
+        }
+    for (uint32_t k = 0; k < n; ++k) {
+        const uint32_t south = k, north = n - k + n * (n + 1), east = n + k * (n + 1), west = (n - k) * (n + 1);
+        quad(south + floor, south + 1 + floor, south + 1, south), quad(north + floor, north - 1 + floor, north - 1, north);
+        quad(east + floor, east + n + 1 + floor, east + n + 1, east), quad(west + floor, west - n - 1 + floor, west - n - 1, west);
+    }
+    return mesh;
+}
 Mesh cube(const glm::vec3& lower, const glm::vec3& upper) {
     Mesh mesh = tank(0);
     for (glm::vec3& x : mesh.positions) x = lower + (upper - lower) * glm::clamp(2.f * x + 0.5f, glm::vec3(0), glm::vec3(1));
@@ -130,6 +153,44 @@ TEST_CASE("what lies flat in a wall goes through it, and nothing else moves") {
     Mesh ball = sphere(32, 1);
     push_through_walls(ball, {{-1, -1, -1}, {1, 1, 1}}, median_edge(ball), 0.01f);
     CHECK(ball.positions == sphere(32, 1).positions);  // it only touches
+}
+
+TEST_CASE("rims are sharp where surface leaves nearly all of a wall at a crease") {
+    const glm::vec3 lower(-1, -1, -0.5f), upper(1, 1, 0.6f);
+    const Container container = container_of(&lower.x, &upper.x, all_but_top, 1);
+    const auto sharp_of = [&](const Mesh& mesh) { return rim_facts(mesh, container, median_edge(mesh)).sharp_walls(); };
+    const Mesh sharp = pool(40), bevelled = bevelled_tank(0.3, 0.07f);
+    REQUIRE(open_edges(sharp).empty());
+    CHECK(rim_facts(sharp, container, 0.05f).all[4] == doctest::Approx(8));
+    CHECK(sharp_of(sharp) == all_but_top);
+    CHECK(sharp_of(bevelled) == 0);
+    CHECK(sharp_of(Mesh{}) == 0);
+    RimFacts both = rim_facts(sharp, container, 0.05f);
+    both.add(rim_facts(bevelled, container, median_edge(bevelled)));
+    CHECK(both.sharp_walls() == 0);
+}
+
+TEST_CASE("liquid with sharp rims goes far through its walls, along its own surface") {
+    const glm::vec3 lower(-1, -1, -0.5f), upper(1, 1, 0.6f);
+    const Mesh before = pool(80);
+    const float edge = median_edge(before);
+    for (const uint32_t sharp : {all_but_top, 0b000001u}) {
+        const Container container = container_of(&lower.x, &upper.x, all_but_top | sharp << rill::format::sharp_rims_shift, edge);
+        Mesh mesh = before;
+        push_through_walls(mesh, container, edge, 0.01f * edge);
+        size_t rims = 0;
+        for (size_t v = 0; v < mesh.positions.size(); ++v) {
+            const glm::vec3 &was = before.positions[v], &is = mesh.positions[v];
+            if (was.x == -1) CHECK(is.x < -1 - 2 * edge);
+            if (was.x == 1) CHECK(is.x - 1 == doctest::Approx(sharp == all_but_top ? -1 - mesh.positions[0].x : 0.01 * edge).epsilon(0.01));
+            if (was.z == -0.5f || was.x != -1 || std::fabs(was.y) > 0.99f) continue;
+            const float slope = 0.3f * std::cos(3 * was.x + 2 * was.y);
+            CHECK(std::fabs(is.z - was.z - slope * (is.x - was.x)) < 0.1f * edge);
+            ++rims;
+        }
+        CHECK(rims == 79);
+        CHECK(mesh.positions[40 + 81 * 40] == before.positions[40 + 81 * 40]);
+    }
 }
 
 TEST_CASE("of a volume, what lies in the container") {
