@@ -143,7 +143,7 @@ LayerError error_of(std::vector<Off>& off) {
     return {float(sum / area), p99->distance, 0};
 }
 
-/// Error of the taken tracks, on a few frames of the window.
+/// Error of the taken tracks, with all drops or none, on a few frames of the window.
 LayerError measure_taken(const Window& window, const std::vector<TrackSamples>& tracks, const std::vector<bool>& taken, bool with_drops, int jobs) {
     const size_t looks = (window.frames.size() + measured_stride - 1) / measured_stride;
     std::vector<LayerError> at(looks);

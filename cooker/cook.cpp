@@ -136,13 +136,13 @@ double duration(const SequenceInfo& info) {
     return n > 1 && between > 0 ? between * n / (n - 1) : n / info.frames_per_second;
 }
 
-/// What every part and the asset say of the cook.
 /// As format::Header::walls.
 uint32_t header_walls(const Survey& survey) {
     const uint32_t bevel = uint32_t(std::lround(survey.bevel / survey.edge * float(format::bevel_parts)));
     return survey.walls | survey.sharp << format::sharp_rims_shift | std::min(bevel, format::every_bevel) << format::bevel_shift;
 }
 
+/// What every part and the asset say of the cook.
 nlohmann::json cook_json(const Job& job, const CookSettings& settings, const Survey& survey, const Aim& aim) {
     const SequenceInfo& info = job.reader->info();
     const double frames = double(info.numbers.size());

@@ -98,7 +98,7 @@ TEST_CASE("what was written is what is read") {
     CHECK(make_ball(clip) == bytes);  // the same input gives the same bytes
 }
 
-TEST_CASE("room for the mesh: as much surface as there is, however few points it has; no more than a whole number of boxes") {
+TEST_CASE("room for the mesh: as much surface as there is, however few points it has; no more than three boxes") {
     const auto vertices = [](uint32_t points, float cell) {
         Clip clip;
         clip.points = points, clip.cell = cell;

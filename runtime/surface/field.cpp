@@ -274,7 +274,7 @@ void place_drops(Field& f, const format::DropSet& drops) {
 
 size_t field_bytes(uint32_t points, uint32_t drops) noexcept {
     return aligned(points * sizeof(Patch)) + point_rows * aligned((points + lanes) * sizeof(float)) +
-           aligned(points * sizeof(uint32_t)) + (drop_rows + 1) * aligned(drops * sizeof(float)) +
+           aligned(points * sizeof(uint32_t)) + drop_rows * aligned(drops * sizeof(float)) + aligned(drops * sizeof(uint32_t)) +
            drop_bundle_rows * aligned(bundles_of(drops) * sizeof(float)) +
            bundle_bytes(bundles_of(points)) + bundle_bytes(bundles_of(bundles_of(points)));
 }
