@@ -394,7 +394,8 @@ TEST_CASE("specks of one corner or two are no surface, bubbles of three are") {
     const FieldAccess access{gather_points, bubbled_ball, no_gradient};
     bubbles = false;
     const Mesh clean = mesh(hand.finish(), {.cell = 1, .access = &access});
-    for (const int* c : bubble_corners) hand.seed(c[0] + 0.1, c[1] + 0.1, c[2] + 0.1);
+    for (const int* c : bubble_corners)
+        for (const double off : {-0.2, -0.1, 0.1, 0.2}) hand.seed(c[0] + off, c[1] + off, c[2] + off);  // however many points are there
     bubbles = true;
     const Mesh m = mesh(hand.finish(), {.cell = 1, .access = &access});
     CHECK(topology(m).closed_manifold());
@@ -402,6 +403,19 @@ TEST_CASE("specks of one corner or two are no surface, bubbles of three are") {
     CHECK(topology(m).euler == 4);
     CHECK(clean.indices.size() > 500);
     CHECK(m.indices.size() - clean.indices.size() == 3 * 28);
+}
+
+TEST_CASE("drops of a corner or two that touch each other are drawn") {
+    for (const double radius : {0.02, 0.03, 0.05}) {
+        CAPTURE(radius);
+        Cloud cloud;
+        for (int i = 0; i < 20; ++i)
+            for (const double side : {-0.8, 0.8}) cloud.add_drop({0.31 * i, 0.07 * i, side * radius}, {radius, radius, radius});
+        const RealField real(cloud);
+        const Mesh m = mesh(real.field, {.cell = 0.06f});
+        CHECK(topology(m).closed_manifold());
+        CHECK(topology(m).euler == 2 * 20);
+    }
 }
 
 TEST_CASE("gyroid noise: closed 2-manifold found from one seed per piece, on the field") {

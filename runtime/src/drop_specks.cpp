@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Surface cells without specks: pieces of a few corners that fewer than three points stand by, and no drop. They are
-// what the field means where patches of sharp rims end, not liquid: a violent splash had 15 in a frame, of 12 to 50
-// triangles. The march has visited all cells round a piece, so that its neighbours are known. Corners that tiles of
-// different size share stay as they are: those see other neighbours.
+// Surface cells without specks: pieces of a few corners that no drop holds, and that are of one corner or two or have
+// fewer than three points by them. They are what the field means where patches of sharp rims end, not liquid: a violent splash
+// had 15 in a frame, of 12 to 50 triangles. (Drops are what liquid as small as two corners is cooked to. Pieces that their
+// source does not have, and source pieces lost, 51 frames of pour_sphere: 39 and 3 with points enough for small ones, too, 14 and 3 so;
+// four times as large cells: 667 and 41, 203 and 61; two times: 77 and 17, 38 and 17. Ten points for small ones: 301 and 54 in the largest.)
+// The march has visited all cells round a piece, so that its neighbours are known. Corners that tiles of different size share
+// stay as they are: those see other neighbours.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -12,7 +15,7 @@
 namespace rill {
 namespace {
 
-constexpr uint32_t most_corners = 24, enough_points = 3;
+constexpr uint32_t most_corners = 24, least_corners = 3, enough_points = 3;
 constexpr int widest = 7;  // steps from the first corner: a piece lies in its tile and those beside
 
 enum class Sign { unknown, outside, inside };
@@ -80,35 +83,59 @@ bool collect(const Mesher& m, const Tile& tile, const Place& first, Piece& piece
     return true;
 }
 
-/// Points in the cells that have a corner of the piece.
-uint32_t count_points(const Mesher& m, MesherScratch& s, const Tile& tile, const Piece& piece) {
-    int lower[3] = {piece.corner[0].x, piece.corner[0].y, piece.corner[0].z}, upper[3];
-    std::memcpy(upper, lower, sizeof(upper));
-    for (uint32_t k = 1; k < piece.count; ++k) {
-        const int p[3] = {piece.corner[k].x, piece.corner[k].y, piece.corner[k].z};
-        for (int a = 0; a < 3; ++a) lower[a] = std::min(lower[a], p[a]), upper[a] = std::max(upper[a], p[a]);
+/// Whether drop d holds a corner of the piece.
+bool holds_corner(const surface::Field& f, uint32_t d, const Tile& tile, const Piece& piece) {
+    const float xx = f.inverse[0][d], yy = f.inverse[1][d], zz = f.inverse[2][d], xy = f.inverse[3][d], xz = f.inverse[4][d], yz = f.inverse[5][d];
+    return std::any_of(piece.corner, piece.corner + piece.count, [&](const Place& p) {
+        const float x = corner_at(tile, 0, p.x) - f.dx[d], y = corner_at(tile, 1, p.y) - f.dy[d], z = corner_at(tile, 2, p.z) - f.dz[d];
+        const float ex = xx * x + xy * y + xz * z, ey = xy * x + yy * y + yz * z, ez = xz * x + yz * y + zz * z;
+        return ex * ex + ey * ey + ez * ez < 1;
+    });
+}
+
+/// The cells that have a corner of the piece, in cells from the tile's first corner.
+struct Extent {
+    int lower[3], upper[3];
+    explicit Extent(const Piece& piece) {
+        const Place& first = piece.corner[0];
+        for (int a = 0; a < 3; ++a) lower[a] = upper[a] = a == 0 ? first.x : a == 1 ? first.y : first.z;
+        for (uint32_t k = 1; k < piece.count; ++k) {
+            const int p[3] = {piece.corner[k].x, piece.corner[k].y, piece.corner[k].z};
+            for (int a = 0; a < 3; ++a) lower[a] = std::min(lower[a], p[a]), upper[a] = std::max(upper[a], p[a]);
+        }
+        for (int a = 0; a < 3; ++a) --lower[a], ++upper[a];
     }
-    surface::Box box;
-    for (int a = 0; a < 3; ++a) {
-        box.lower[a] = float(tile_cells * tile.coord[a] + lower[a] - 1) * tile.cell;
-        box.upper[a] = float(tile_cells * tile.coord[a] + upper[a] + 1) * tile.cell;
-    }
+};
+
+/// Whether point j is in a cell that has a corner of the piece.
+bool is_beside(const surface::Field& f, uint32_t j, const Tile& tile, const Piece& piece) {
+    const auto cell = [&](float at, int a) {
+        const float c = std::floor(at / tile.cell) - float(tile_cells * tile.coord[a]);
+        return int(std::clamp(c, -100.f, 100.f));
+    };
+    const int x = cell(f.x[j], 0), y = cell(f.y[j], 1), z = cell(f.z[j], 2);
+    for (int k = 0; k < 8; ++k)
+        if (piece.holds({x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)})) return true;
+    return false;
+}
+
+/// Whether drops or points mean the piece.
+bool is_meant(const Mesher& m, MesherScratch& s, const Tile& tile, const Piece& piece) {
     const surface::Field& f = *m.input.field;
+    const Extent extent(piece);
+    surface::Box box;
+    for (uint32_t a = 0; a < 3; ++a) box.lower[a] = corner_at(tile, a, extent.lower[a]), box.upper[a] = corner_at(tile, a, extent.upper[a]);
     const uint32_t found = std::min(m.access.gather(f, box, s.candidates, s.most_candidates), s.most_candidates);
-    uint32_t count = 0;
+    uint32_t points = 0;
     for (uint32_t c = 0; c < found; ++c) {
         const uint32_t j = s.candidates[c];
-        if (j >= f.point_count) return enough_points;  // a drop is what it is
-        const auto cell = [&](float x, int a) {
-            const float c = std::floor(x / tile.cell) - float(tile_cells * tile.coord[a]);
-            return int(std::clamp(c, -100.f, 100.f));
-        };
-        const int x = cell(f.x[j], 0), y = cell(f.y[j], 1), z = cell(f.z[j], 2);
-        bool beside = false;
-        for (int k = 0; k < 8; ++k) beside = beside || piece.holds({x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)});
-        count += beside;
+        if (j >= f.point_count) {
+            if (holds_corner(f, j - f.point_count, tile, piece)) return true;
+        } else {
+            points += piece.count >= least_corners && is_beside(f, j, tile, piece);
+        }
     }
-    return count;
+    return points >= enough_points;
 }
 
 /// Known corners of a row that may be the first of their piece: those before it along x, y, z are of the other sign.
@@ -128,7 +155,7 @@ void find_specks(const Mesher& m, MesherScratch& s, Tile& tile) {
         uint32_t bits = firsts(tile, row % 8, row / 8);
         for (int x = 0; bits; ++x, bits >>= 1) {
             if (!(bits & 1) || !collect(m, tile, {x, int(row % 8), int(row / 8)}, piece)) continue;
-            if (count_points(m, s, tile, piece) >= enough_points) continue;
+            if (is_meant(m, s, tile, piece)) continue;
             tile.speck[row] |= uint8_t(1 << x);
             tile.has_specks = true;
         }

@@ -174,7 +174,7 @@ uint32_t find_beyond(const Mesher& m, const Tile& tile, uint32_t face) noexcept;
 uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
 /// The leaf that holds a position; false when that is out of reach.
 bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t coord[3]) noexcept;
-float corner_at(const Tile& tile, uint32_t axis, uint32_t corner) noexcept;
+float corner_at(const Tile& tile, uint32_t axis, int32_t corner) noexcept;
 /// Of a cube: at least in part.
 bool in_sight(const Mesher& m, const float centre[3], float half) noexcept;
 /// Puts it into the list of the coming round.
