@@ -59,6 +59,10 @@ inline double mean_step(const format::LatticeSteps& steps, uint32_t life) {
 inline double motion_step(const format::LatticeSteps& steps, uint32_t life) {
     return mean_step(steps, life) * std::sqrt(double(life)) * format::position_gain;
 }
+/// Of a drop's shape.
+inline double shape_step(const format::LatticeSteps& steps, uint32_t life) {
+    return motion_step(steps, life) * steps.shape_unit / 256;
+}
 inline double turn_step(const format::LatticeSteps& steps, uint32_t life) {
     return steps.normal_step * format::life_factor(life) * std::sqrt(double(life)) * format::normal_gain;
 }

@@ -128,6 +128,7 @@ struct Fitter {
     uint32_t life() const { return uint32_t(samples.position.size()); }
     double tangent_step() const { return double(steps.step) * steps.ratio / 16; }
     double motion_step() const { return cooker::motion_step(steps, life()); }
+    double shape_step() const { return cooker::shape_step(steps, life()); }
     double turn_step() const { return cooker::turn_step(steps, life()); }
     dvec3 position(uint32_t s) const { return dvec3(samples.position[s]) - origin; }
 
@@ -256,9 +257,9 @@ void Fitter::keep_volume(const Basis& basis, Rows<6>& shape) const {
     for (uint32_t s = 0; s < n; ++s) {
         double v[6] = {};
         for (uint32_t k = 0; k < basis.terms; ++k)
-            for (size_t c = 0; c < 6; ++c) v[c] += shape[k][c] * basis.row[s][k] * motion_step();
+            for (size_t c = 0; c < 6; ++c) v[c] += shape[k][c] * basis.row[s][k] * shape_step();
         coded[s] = matrix_of(v);
-        for (size_t c = 0; c < 3; ++c) off[c] -= double(samples.shape[s][c]) / (std::sqrt(double(n)) * motion_step());
+        for (size_t c = 0; c < 3; ++c) off[c] -= double(samples.shape[s][c]) / (std::sqrt(double(n)) * shape_step());
     }
     for (size_t c = 0; c < 3; ++c) off[c] += shape[0][c];
     std::array<int32_t, 3> best{};
@@ -269,7 +270,7 @@ void Fitter::keep_volume(const Basis& basis, Rows<6>& shape) const {
         for (size_t c = 0; c < 3; ++c) cost += still_shape * n * (off[c] + by[c]) * (off[c] + by[c]);
         for (uint32_t s = 0; s < n; ++s) {
             glm::dmat3 m = coded[s];
-            for (int c = 0; c < 3; ++c) m[c][c] += by[size_t(c)] * basis.row[s][0] * motion_step();
+            for (int c = 0; c < 3; ++c) m[c][c] += by[size_t(c)] * basis.row[s][0] * shape_step();
             const double larger = glm::determinant(m) / glm::determinant(matrix_of(samples.shape[s])) - 1;
             cost += larger * larger;
         }
@@ -296,8 +297,8 @@ Attempt Fitter::attempt_drop(const Basis& basis) const {
     for (int c = 0; c < 6; ++c) {
         double mean = 0;
         for (uint32_t s = 0; s < n; ++s) mean += (signal[s] = samples.shape[s][size_t(c)]) / n;
-        shape[0][size_t(c)] = checked(mean * std::sqrt(double(n)) / motion_step());
-        out.add(quantise_series(basis, signal, shape_tolerance * quantiser.time_tolerance, motion_step(), c, shape, of_shapes));
+        shape[0][size_t(c)] = checked(mean * std::sqrt(double(n)) / shape_step());
+        out.add(quantise_series(basis, signal, shape_tolerance * quantiser.time_tolerance, shape_step(), c, shape, of_shapes));
     }
     keep_volume(basis, shape);
     track.flags = uint8_t(samples.flags | (basis.cosine ? format::track_cosine : 0));

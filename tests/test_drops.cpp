@@ -239,7 +239,8 @@ TEST_CASE("a drop keeps its volume when it is coded, whatever its axes are round
     double mean = 0, square = 0;
     int count = 0;
     for (int i = 0; i < 60; ++i) {
-        const glm::vec3 a = edge * glm::vec3(radius(random), radius(random), radius(random));
+        glm::vec3 a = edge * glm::vec3(radius(random), radius(random), radius(random));
+        if (i % 3 == 0) a = glm::vec3(a.x);  // a ball's axes are rounded alike
         TrackSamples drop;
         drop.drop = true, drop.birth = 0, drop.death = uint8_t(i % 12);
         const glm::vec3 start(any(random), any(random), any(random));
@@ -255,7 +256,7 @@ TEST_CASE("a drop keeps its volume when it is coded, whatever its axes are round
         }
     }
     CHECK(mean / count == doctest::Approx(1).epsilon(0.005));
-    CHECK(std::sqrt(square / count) < 0.022);
+    CHECK(std::sqrt(square / count) < 0.01);
 }
 
 TEST_CASE("what hangs on a needle is held by a drop, and what does not hang together stays apart") {

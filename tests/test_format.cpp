@@ -10,6 +10,7 @@
 #include "asset_player.h"
 #include "format/check.h"
 #include "format/cursor.h"
+#include "format/lattice.h"
 
 using namespace harness;
 using rill::Status;
@@ -96,6 +97,24 @@ TEST_CASE("what was written is what is read") {
     for (uint32_t f = 0; f < 25; ++f) CHECK(rill::frame_seconds(opened.asset, f) == clip.seconds(f));
     CHECK(rill::frame_seconds(opened.asset, 1000) == clip.seconds(24));
     CHECK(make_ball(clip) == bytes);  // the same input gives the same bytes
+}
+
+TEST_CASE("shapes of drops: a step as that of motion, from version 6 on a quarter of it") {
+    using namespace rill::format;
+    Header header{};
+    for (const uint32_t version : {version_4, version_5, version_6}) {
+        CAPTURE(version);
+        header.version = version;
+        const LatticeSteps steps = steps_of(header, WindowRecord{});
+        CHECK(steps.shape_unit == (version < version_6 ? 256 : 64));
+        RawTrack raw{};
+        raw.position_terms = raw.second_terms = 1, raw.second[0][2] = -3;
+        float memory[9];
+        Track record;
+        TrackBlock block{{}, 0, 0, 1, 9, &record, memory};
+        REQUIRE(place_track(raw, steps, true, block, 0, 0));
+        CHECK(load(memory + 3 + 2) == -3 * steps.shape_unit);
+    }
 }
 
 TEST_CASE("room for the mesh: as much surface as there is, however few points it has; no more than three boxes") {

@@ -220,7 +220,7 @@ Status check_header(const uint8_t* bytes, size_t size, uint64_t file_bytes, Head
     Cursor cursor(bytes, header_bytes);
     read_header(cursor, out);
     // Before the checksum: another version may keep its checksum elsewhere.
-    if (out.version != version_4 && out.version != current_version) {
+    if (out.version < version_4 || out.version > current_version) {
         if (reason) *reason = "format version is not known to this library";
         return Status::unknown_format;
     }

@@ -141,7 +141,7 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
     out += 3 * raw.position_terms;
     if (drop) {
         for (uint32_t k = 0; k < raw.second_terms; ++k)
-            for (int c = 0; c < 6; ++c) store(out + 6 * k + c, raw.second[k][c] * 256);
+            for (int c = 0; c < 6; ++c) store(out + 6 * k + c, raw.second[k][c] * steps.shape_unit);
         return true;
     }
     store(out, raw.axis[0]), store(out + 1, raw.axis[1]), store(out + 2, 0);

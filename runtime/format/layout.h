@@ -19,7 +19,8 @@ enum Version : uint32_t {
     version_3 = 3,  ///< 2026-11: steps depend on the life of a track
     version_4 = 4,  ///< 2026-11: smaller records, steps by window; lives by their neighbours'
     version_5 = 5,  ///< 2026-11: walls: the liquid is cut off at sides of its bounds
-    current_version = version_5,
+    version_6 = 6,  ///< 2026-11: shapes of drops on a lattice four times as fine
+    current_version = version_6,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.
