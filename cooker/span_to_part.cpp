@@ -152,14 +152,16 @@ SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const
     const ChosenFrames judged(reader_, judged_frames_of(span));
     SpanResult kept;
     const double edges = aim_.p99 / survey_.edge;
+    bool best_met = false;
     double tolerance = first_tolerance(edges, survey_.wall_share) * aim_.p99, best_miss = HUGE_VAL, ratio_before = 0, tolerance_before = 0;
     for (int attempt = 1;; ++attempt) {
         SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
         result.measured = verify(candidate, judged, settings_.jobs, {}, Scrutiny::glance).totals;
         const double ratio = result.measured.p99() / aim_.p99, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
-        if (attempt == 1 || miss < best_miss) best_miss = miss, kept = std::move(result), move_file(candidate, best);
+        const bool met = ratio <= 1 + met_within, near = miss == 0 || (met && ratio >= 1 - finer_by);
+        // One that misses the target is no better than one that is too fine, however near it comes.
+        if (attempt == 1 || (met == best_met ? miss < best_miss : met)) best_miss = miss, best_met = met, kept = std::move(result), move_file(candidate, best);
         kept.attempts = attempt;
-        const bool near = miss == 0 || (ratio <= 1 + met_within && ratio >= 1 - finer_by);
         if (near || attempt == most_attempts) return kept;
         if (attempt > 1 && ratio > least_hopeless && tolerance < tolerance_before &&
             std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
