@@ -2,7 +2,7 @@
 // Surface cells without specks: pieces of a few corners that no drop holds, and that are of one corner or two or have
 // fewer than three points by them. They are what the field means where patches of sharp rims end, not liquid: a violent splash
 // had 15 in a frame, of 12 to 50 triangles. (Drops are what liquid as small as two corners is cooked to. Pieces that their
-// source does not have, and source pieces lost, 51 frames of pour_sphere: 39 and 3 with points enough for small ones, too, 14 and 3 so;
+// source does not have, and source pieces lost, 51 frames of pour_sphere: 39 and 3 with points enough for small ones, too, 4 and 3 so;
 // four times as large cells: 667 and 41, 203 and 61; two times: 77 and 17, 38 and 17. Ten points for small ones: 301 and 54 in the largest.)
 // The march has visited all cells round a piece, so that its neighbours are known. Corners that tiles of different size share
 // stay as they are: those see other neighbours.
