@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
+#include <memory>
 
 #include "parallel.h"
 #include "surface/field_to_mesh.h"
@@ -10,9 +12,15 @@
 namespace rill::cooker {
 namespace {
 
-void* aligned(std::vector<uint8_t>& memory, size_t bytes) {
-    if (memory.size() < bytes + 64) memory.resize(bytes + 64);
-    return reinterpret_cast<void*>((reinterpret_cast<uintptr_t>(memory.data()) + 63) & ~uintptr_t(63));
+/// Memory as it comes, not zeroed: most is never touched.
+template <class T>
+std::unique_ptr<T[]> raw(size_t count) {
+    return std::make_unique_for_overwrite<T[]>(count);
+}
+/// In 64-byte alignment.
+void* aligned(std::unique_ptr<std::byte[]>& memory, size_t bytes) {
+    memory = raw<std::byte>(bytes + 64);
+    return reinterpret_cast<void*>((reinterpret_cast<uintptr_t>(memory.get()) + 63) & ~uintptr_t(63));
 }
 
 /// The stages of the mesher on as many threads as it has workers.
@@ -70,18 +78,18 @@ std::vector<float> PointField::values_at(const std::vector<float>& x, const std:
 Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs, size_t about) {
     const PointField decoded(points, jobs);
     const uint32_t workers = uint32_t(threads_of(jobs));
-    std::vector<uint8_t> memory;
-    std::vector<uint32_t> indices;
+    std::unique_ptr<std::byte[]> memory;
+    std::unique_ptr<uint32_t[]> indices;
     Mesh mesh;
     Target target{};
     constexpr uint32_t most = 1u << 26;
-    for (uint32_t vertices = uint32_t(std::clamp<size_t>(about + about / 4, 1u << 16, most));; vertices = std::min(2 * vertices, most)) {
+    for (uint32_t vertices = uint32_t(std::clamp<size_t>(about + about / 4, 1u << 12, most));; vertices = std::min(2 * vertices, most)) {
         const MeshLimits limits{vertices, 0, 0, workers};
         Mesher* mesher = place_mesher(aligned(memory, mesher_bytes(limits)), limits);
-        mesh.positions.resize(vertices), indices.resize(size_t(vertices) * 8);
+        mesh.positions.resize(vertices), indices = raw<uint32_t>(size_t(vertices) * 8);
         target.position = {mesh.positions.data(), sizeof(glm::vec3)};
-        target.indices = indices.data();
-        target.vertex_capacity = vertices, target.index_capacity = uint32_t(indices.size());
+        target.indices = indices.get();
+        target.vertex_capacity = vertices, target.index_capacity = vertices * 8;
         Levels levels{};
         levels.cell_size = cell;
         begin_mesh(mesher, {&decoded.field, levels, nullptr, 0, false, &target});

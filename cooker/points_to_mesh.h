@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What a set of points decodes to, as the runtime would draw it.
 #pragma once
+#include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "mesh.h"
@@ -20,7 +22,7 @@ public:
 
 private:
     std::vector<float> rows_[10];
-    std::vector<uint8_t> memory_;
+    std::unique_ptr<std::byte[]> memory_;
 };
 
 /// The runtime's mesh of the points, with cells of that size (metres): positions and triangles.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Heights chosen anew where few points make a piece of liquid, or it is thin. How each is rounded is chance, and where no thousand others make up for it
-// the piece's volume is off by as much: a ball of 39 points, pour_sphere 1, by .8 %. So mean heights go up or down by a step of the lattice,
+// Heights chosen anew where few points make a piece of liquid, or it is thin. How each is rounded is chance, and where no thousand
+// others make up for it the piece's volume is off by as much: a ball of 39 points, pour_sphere 1, by .8 %. So mean heights go up or down by a step of the lattice,
 // of those tracks first that the surface is the better for or hardly the worse, until the volume of every such piece is about the source's.
 // What that gains: README.md, "Drops and bubbles". Pieces meshed by themselves, to save time, have other supports than beside the rest: they
 // came out up to a quarter too large.
@@ -19,7 +19,7 @@ namespace rill::cooker {
 namespace {
 
 constexpr size_t few_points = 1000;   // of a piece; frames of more are within .2 % by themselves,
-constexpr double thin = 2;            // unless there are fewer cubic edges of volume to a square edge of surface: a glass half full of splashes was off by .9 %
+constexpr double thin = 2;            // unless they have fewer cubic edges of volume to a square edge of surface
 // Off by less is near enough, of the volume of a piece that is most of its frame's, and of others. A step of one point of a droplet
 // is as much.
 constexpr double near_main = 2.5e-3, near_other = 0.03;

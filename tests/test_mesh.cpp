@@ -405,6 +405,30 @@ TEST_CASE("specks of one corner or two are no surface, bubbles of three are") {
     CHECK(m.indices.size() - clean.indices.size() == 3 * 28);
 }
 
+/// Points, and one drop, wherever it is asked for.
+uint32_t gather_with_drop(const surface::Field& f, const surface::Box& box, uint32_t* out, uint32_t capacity) noexcept {
+    const uint32_t n = gather_points(f, box, out, capacity);
+    if (n < capacity) out[n] = f.point_count;
+    return n + 1;
+}
+
+TEST_CASE("a drop that reaches a speck keeps it only if it holds a corner of it") {
+    for (const bool holds : {false, true}) {
+        CAPTURE(holds);
+        HandField hand;
+        hand.seed(8, 8, -1.3);
+        for (const int* c : bubble_corners) hand.seed(c[0] + 0.1, c[1] + 0.1, c[2] + 0.1);
+        float centre[3] = {8, 8, holds ? 8.3f : 9.3f}, inverse[6] = {2.f, 2.f, 2.f, 0, 0, 0};  // a ball of half a cell
+        hand.field.dx = centre, hand.field.dy = centre + 1, hand.field.dz = centre + 2;
+        for (int k = 0; k < 6; ++k) hand.field.inverse[k] = inverse + k;
+        bubbles = true;
+        const FieldAccess access{gather_with_drop, bubbled_ball, no_gradient};
+        const Mesh m = mesh(hand.finish(), {.cell = 1, .access = &access});
+        CHECK(topology(m).closed_manifold());
+        CHECK(topology(m).euler == (holds ? 6 : 4));  // of one corner, besides the ball and the bubble of three
+    }
+}
+
 TEST_CASE("drops of a corner or two that touch each other are drawn") {
     for (const double radius : {0.02, 0.03, 0.05}) {
         CAPTURE(radius);

@@ -116,7 +116,7 @@ TEST_CASE("windows fill a span and are of even length; calm ones are longer, but
 TEST_CASE("segments, linked in any order, are the asset that one machine makes") {
     Clip clip;
     REQUIRE(SpanPlan{frames, 1}.spans() == 3);
-    for (uint32_t count : {1u, 2u, 3u, 5u}) {
+    for (uint32_t count : {1u, 3u, 5u}) {
         CAPTURE(count);
         std::vector<std::string> parts = clip.segments(count);
         std::reverse(parts.begin(), parts.end());
@@ -228,7 +228,7 @@ TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are
 
 TEST_CASE("what is there already is not cooked again: same input, settings and tool") {
     Clip clip;
-    clip.cook(clip.asset);
+    put_file(clip.asset, whole());
     const auto time = fs::last_write_time(clip.asset);
     uint32_t steps = 0;
     const auto count = [&](const CookProgress&) { ++steps; };

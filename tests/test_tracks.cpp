@@ -311,6 +311,39 @@ TEST_CASE("heights of few points are stepped until the volume is the source's, a
     CHECK(refitted(coded, 2).second == 0);
 }
 
+TEST_CASE("so are heights of many points where liquid is thin; where it is thick they stay") {
+    for (const float flat : {0.06f, 1.f}) {
+        CAPTURE(flat);
+        Window window = standing_ball();
+        Mesh mesh = bumpy_sphere(200, radius);
+        for (glm::vec3& x : mesh.positions) x.z *= flat;
+        const float edge = median_edge(mesh);
+        const auto frame = std::make_shared<const SurfaceFrame>(std::move(mesh), edge);
+        window.frames.resize(2), window.seconds.resize(2), window.motion.resize(1);
+        window.motion[0].assign(frame->mesh.positions.size(), glm::vec3(0));
+        std::fill(window.frames.begin(), window.frames.end(), frame);
+        const WindowGoal goal = goal_of(window, 0.02f);
+        grow_tracks(window, {}, goal);
+        CodedWindow coded = code_tracks(window, goal, tables());
+        REQUIRE(decoded_points(coded.decoded, 0).size() > 1000);
+        for (size_t i = 0; i < coded.tracks.size(); ++i) {
+            coded.tracks[i].position[2] -= 2;
+            coded.decoded[i] = dequantise_track(coded.tracks[i], coded.quantiser, goal.origin, tables());
+        }
+        const auto off = [&] {
+            return std::fabs(signed_volume(mesh_points(decoded_points(coded.decoded, 0), edge)) / signed_volume(frame->mesh) - 1);
+        };
+        const double before = off();
+        refit_volume(window, coded, goal, tables());
+        if (flat < 1) {
+            REQUIRE(before > 0.006);
+            CHECK(off() < 0.003);
+        } else {
+            CHECK(off() == before);
+        }
+    }
+}
+
 TEST_CASE("small pieces of points have their volume, too, beside a large one that keeps its own") {
     Window window = standing_ball();
     const float edge = window.frames[0]->edge;

@@ -11,6 +11,9 @@
 
 namespace rill::format {
 
+/// Step of drops' shapes, in 1/256 of that of motion; before version 6.
+inline constexpr int32_t fine_shape_unit = 64, coarse_shape_unit = 256;
+
 /// Quantiser steps of a window.
 struct LatticeSteps {
     float step;         ///< normal direction, metres; of a life of eight samples, see life_scales
@@ -18,13 +21,12 @@ struct LatticeSteps {
     float origin[3];    ///< the low corner of the file's bounds
     uint16_t ratio;  ///< tangential step / step, in 1/16: 16 … 1024
     float slip_step = 0;  ///< of slip, m/s; 0: points have none
-    int32_t shape_unit = 64;  ///< step of drops' shapes, in 1/256 of that of motion
+    int32_t shape_unit = fine_shape_unit;
 };
 /// Finite, positive, ratio in range; says nothing else of the values.
 bool valid(const LatticeSteps& steps) noexcept;
 inline LatticeSteps steps_of(const Header& h, const WindowRecord& w) noexcept {
-    constexpr int32_t fine = LatticeSteps{}.shape_unit, coarse = 256;
-    return {w.step, w.normal_step, {h.lower[0], h.lower[1], h.lower[2]}, w.ratio, w.slip_step, h.version < version_6 ? coarse : fine};
+    return {w.step, w.normal_step, {h.lower[0], h.lower[1], h.lower[2]}, w.ratio, w.slip_step, h.version < version_6 ? coarse_shape_unit : fine_shape_unit};
 }
 
 /// Largest integer whose square is no more than x.

@@ -85,27 +85,27 @@ bool collect(const Mesher& m, const Tile& tile, const Place& first, Piece& piece
 
 /// Whether drop d holds a corner of the piece.
 bool holds_corner(const surface::Field& f, uint32_t d, const Tile& tile, const Piece& piece) {
-    const float xx = f.inverse[0][d], yy = f.inverse[1][d], zz = f.inverse[2][d], xy = f.inverse[3][d], xz = f.inverse[4][d], yz = f.inverse[5][d];
+    float inverse[6];
+    for (int k = 0; k < 6; ++k) inverse[k] = f.inverse[k][d];
     return std::any_of(piece.corner, piece.corner + piece.count, [&](const Place& p) {
-        const float x = corner_at(tile, 0, p.x) - f.dx[d], y = corner_at(tile, 1, p.y) - f.dy[d], z = corner_at(tile, 2, p.z) - f.dz[d];
-        const float ex = xx * x + xy * y + xz * z, ey = xy * x + yy * y + yz * z, ez = xz * x + yz * y + zz * z;
-        return ex * ex + ey * ey + ez * ez < 1;
+        const float r[3] = {corner_at(tile, 0, p.x) - f.dx[d], corner_at(tile, 1, p.y) - f.dy[d], corner_at(tile, 2, p.z) - f.dz[d]};
+        return length_of(inverse, r) < 1;
     });
 }
 
-/// The cells that have a corner of the piece, in cells from the tile's first corner.
-struct Extent {
-    int lower[3], upper[3];
-    explicit Extent(const Piece& piece) {
-        const Place& first = piece.corner[0];
-        for (int a = 0; a < 3; ++a) lower[a] = upper[a] = a == 0 ? first.x : a == 1 ? first.y : first.z;
-        for (uint32_t k = 1; k < piece.count; ++k) {
-            const int p[3] = {piece.corner[k].x, piece.corner[k].y, piece.corner[k].z};
-            for (int a = 0; a < 3; ++a) lower[a] = std::min(lower[a], p[a]), upper[a] = std::max(upper[a], p[a]);
+/// The box of the cells that have a corner of the piece.
+surface::Box box_round(const Tile& tile, const Piece& piece) {
+    constexpr float far = surface::unsupported;
+    surface::Box box{{far, far, far}, {-far, -far, -far}};
+    for (uint32_t k = 0; k < piece.count; ++k) {
+        const int p[3] = {piece.corner[k].x, piece.corner[k].y, piece.corner[k].z};
+        for (uint32_t a = 0; a < 3; ++a) {
+            box.lower[a] = std::min(box.lower[a], corner_at(tile, a, p[a] - 1));
+            box.upper[a] = std::max(box.upper[a], corner_at(tile, a, p[a] + 1));
         }
-        for (int a = 0; a < 3; ++a) --lower[a], ++upper[a];
     }
-};
+    return box;
+}
 
 /// Whether point j is in a cell that has a corner of the piece.
 bool is_beside(const surface::Field& f, uint32_t j, const Tile& tile, const Piece& piece) {
@@ -122,10 +122,7 @@ bool is_beside(const surface::Field& f, uint32_t j, const Tile& tile, const Piec
 /// Whether drops or points mean the piece.
 bool is_meant(const Mesher& m, MesherScratch& s, const Tile& tile, const Piece& piece) {
     const surface::Field& f = *m.input.field;
-    const Extent extent(piece);
-    surface::Box box;
-    for (uint32_t a = 0; a < 3; ++a) box.lower[a] = corner_at(tile, a, extent.lower[a]), box.upper[a] = corner_at(tile, a, extent.upper[a]);
-    const uint32_t found = std::min(m.access.gather(f, box, s.candidates, s.most_candidates), s.most_candidates);
+    const uint32_t found = std::min(m.access.gather(f, box_round(tile, piece), s.candidates, s.most_candidates), s.most_candidates);
     uint32_t points = 0;
     for (uint32_t c = 0; c < found; ++c) {
         const uint32_t j = s.candidates[c];

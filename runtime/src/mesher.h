@@ -3,6 +3,7 @@
 // writes to its own tile only, and reads of other tiles only what an earlier stage has finished.
 #pragma once
 #include <cstddef>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -198,6 +199,12 @@ uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
 
 // small_drops.cpp: drops that cells are too coarse for
+/// |S⁻¹ r|: below 1 in the drop. `inverse`: S⁻¹ as xx yy zz xy xz yz.
+inline float length_of(const float (&inverse)[6], const float (&r)[3]) {
+    const float x = inverse[0] * r[0] + inverse[3] * r[1] + inverse[4] * r[2], y = inverse[3] * r[0] + inverse[1] * r[1] + inverse[5] * r[2],
+                z = inverse[4] * r[0] + inverse[5] * r[1] + inverse[2] * r[2];
+    return std::sqrt(x * x + y * y + z * z);
+}
 uint32_t prepare_judge_drops(void* mesher);
 void run_judge_drops(void* mesher, uint32_t task, uint32_t worker);
 /// What was judged comes true in the field: cells see none that have meshes of their own, and show all others.

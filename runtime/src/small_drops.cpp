@@ -101,13 +101,6 @@ uint32_t mesh_for(float size) { return 1 + (size > 0.7f) + (size > 1.6f); }
 
 // ---- which ones ------------------------------------------------------------------------------------
 
-/// |S⁻¹ r|
-float length_of(const float (&inverse)[6], const float (&r)[3]) {
-    const float x = inverse[0] * r[0] + inverse[3] * r[1] + inverse[4] * r[2], y = inverse[3] * r[0] + inverse[1] * r[1] + inverse[5] * r[2],
-                z = inverse[4] * r[0] + inverse[5] * r[1] + inverse[2] * r[2];
-    return std::sqrt(x * x + y * y + z * z);
-}
-
 /// A drop of the field as {centre + S u}, u on the unit ball.
 struct Ellipsoid {
     float centre[3], inverse[6], shape[6], radius;  ///< S⁻¹ and S as xx yy zz xy xz yz; mean, negative for bubbles
