@@ -305,13 +305,13 @@ TEST_CASE("a single frame, and windows of a single frame") {
 
 TEST_CASE("windows are longer where the liquid is calm, unless it is told how long") {
     const auto calm = [](int i) {
-        Mesh mesh = sphere(12, 0.5f);
-        move(mesh, ball, i / fps);
+        Mesh mesh = torus(24, 12, 0.5f, 0.2f);
+        move(mesh, ring, i / fps);
         return mesh;
     };
     const auto tears = [&](int i) {
         Mesh mesh = calm(i);
-        for (size_t v = 0; v < mesh.velocities.size(); v += 2) mesh.velocities[v] = -mesh.velocities[v];
+        for (size_t v = 0; v < mesh.velocities.size(); v += 2) mesh.velocities[v] *= -10.f;
         return mesh;
     };
     const auto windows = [](const std::function<Mesh(int)>& frame, int window) {
