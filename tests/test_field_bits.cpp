@@ -105,7 +105,7 @@ TEST_CASE("discs: the cells whose middles lie in the ball and by the plane, what
             levels[k]->draw(centre, normal, radius, same);
             CHECK(std::memcmp(rows, same, sizeof(rows)) == 0);
         }
-        const double reach = 0.5 * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2])), rounding = 1e-4;
+        const double reach = 0.35 * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2])), rounding = 1e-4;
         for (int cell = 0; cell < 512; ++cell) {
             const Vec r = Vec{cell % 8 + 0.5, cell / 8 % 8 + 0.5, cell / 64 + 0.5} - Vec{centre[0], centre[1], centre[2]};
             const double beyond = std::max(std::sqrt(dot(r, r)) - radius, std::fabs(dot(n, r)) - reach);

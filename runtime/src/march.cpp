@@ -11,7 +11,7 @@
 namespace rill {
 namespace {
 
-constexpr float disc_share = 0.25f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
+constexpr float disc_share = 0.3f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
 constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
 
 /// Points at a wall may stand a little beyond it: the surface is this side, a quarter of a cell and more.
@@ -109,7 +109,7 @@ void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
         if (i >= f.point_count) break;  // drops come last
         const float place[3] = {in_container(f, 0, f.x[i], tile.cell), in_container(f, 1, f.y[i], tile.cell), in_container(f, 2, f.z[i], tile.cell)};
         const float normal[3] = {f.nx[i], f.ny[i], f.nz[i]};
-        const float radius = disc_share * f.support[i] * cells + 0.5f;
+        const float radius = disc_share * f.support[i] * cells;
         float at[3];  // in cells of this tile
         bool touches = true, is_home = true;
         for (int a = 0; a < 3; ++a) {
@@ -146,6 +146,8 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
     uint16_t hanging[81] = {};
     const bool mixed = (tile.beside & every_coarser) != 0;
     if (mixed) find_hanging(tile, hanging), need_parents(hanging, need);
+    uint16_t missing[81];
+    for (uint32_t row = 0; row < 81; ++row) missing[row] = uint16_t(need[row] & ~(tile.known[row] | hanging[row]));
     float place[3][tile_corners];
     for (uint32_t a = 0; a < 3; ++a)
         for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(tile, a, k);
@@ -157,15 +159,15 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
         for (uint32_t z = from_z; z < to_z; ++z)
             for (uint32_t y = from_y; y < to_y; ++y) {
                 const uint32_t row = y + 9 * z;
-                const uint32_t bits = need[row] & ~uint32_t(tile.known[row] | hanging[row]) & (octant & 1 ? 0x1e0 : 0x01f);
+                const uint32_t bits = missing[row] & (octant & 1 ? 0x1e0 : 0x01f);
                 if (!bits) continue;
-                tile.known[row] |= uint16_t(bits);
                 const float py = place[1][y], pz = place[2][z];
                 for_bits(bits, [&](uint32_t x) {
                     s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x | row << 4);
                 });
             }
     }
+    for (uint32_t row = 0; row < 81; ++row) tile.known[row] |= missing[row];
     s.corners_evaluated += n;
     const surface::Field& field = is_inside(m.input.field->container, tile) ? m.uncut : *m.input.field;
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {

@@ -13,7 +13,7 @@ namespace rill::surface::inner {
 /// 1: a patch that faces the same way as the nearest; 0: opposed to it.
 template <bool fused>
 RILL_INLINE float gate_of(float agree) {
-    return lesser(greater(madd<fused>(agree, gate_scale, -opposed * gate_scale), 0), 1);
+    return within_one(madd<fused>(agree, gate_scale, -opposed * gate_scale));
 }
 
 /// (1 − u²)³ / u²: needs no root, and on real liquids its normals are 2 % nearer to the source's than (1 − u)² / u².
@@ -39,7 +39,8 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
 // Tried: u² and heights of find_nearest() kept for the blend (no faster, computing them again costs as much as loading them);
 // eight positions at a time (a sixth fewer patches for each, yet the blend takes 20 % longer); a path without clusters where
 // all normals of a list agree (a third to a half of the lists of two splashes, an eighth of the third's: 5, 3 and 1 % of a frame);
-// candidates narrowed to the box of the sixteen positions first (of 25 to 56 a tile, 15 to 21 have weight; ±0 to 1 % of a frame);
+// candidates narrowed to the box of the sixteen positions first (of 48 a tile 26 are left, 20 have weight; kept in rows of sixteen for that,
+// 3 % of a frame's instructions less; ±0 to 1 % of its time);
 // sums of eight positions after the other eight, so that they stay in registers (2 % slower).
 
 /// Squared distance and place in a block of a list in one word: the least word is that of the nearest, and the first of
@@ -74,13 +75,13 @@ RILL_INLINE void find_reached(const Field& f, const uint32_t* list, uint32_t cou
     for (uint32_t l = 0; l < lanes; ++l) out.bits[l] = bits[l], out.nearest[l] = nearest[l], out.u2[l] = least[l];
 }
 
-/// The nearest point among those with weight: its normal, the height above its plane and its 1/R². Lists who has weight
+/// The nearest point among those with weight, of the candidates: which, its normal and its 1/R². Lists who has weight
 /// anywhere, at most `most_listed`; returns how many there are.
 template <bool fused>
 RILL_INLINE uint32_t find_nearest(const Field& f, const uint32_t* candidates, uint32_t count, uint32_t* list, Batch& b,
-                                  float* height, float* inverse) {
+                                  int32_t* found, float* inverse) {
     Reached reached;
-    alignas(64) int32_t nearest[lanes], found[lanes];
+    alignas(64) int32_t nearest[lanes];
     alignas(64) float least[lanes];
     for (uint32_t l = 0; l < lanes; ++l) nearest[l] = no_word, found[l] = 0, least[l] = unsupported;
     uint32_t listed = 0;
@@ -97,18 +98,21 @@ RILL_INLINE uint32_t find_nearest(const Field& f, const uint32_t* candidates, ui
     }
     for (uint32_t l = 0; l < lanes; ++l) {
         const Patch& p = f.patches[candidates[found[l]]];
-        b.u2[l] = least[l], b.nx[l] = p.nx, b.ny[l] = p.ny, b.nz[l] = p.nz;
-        height[l] = dot<fused>(p.nx, p.ny, p.nz, b.x[l] - p.x, b.y[l] - p.y, b.z[l] - p.z), inverse[l] = p.inverse;
+        b.u2[l] = least[l], b.nx[l] = p.nx, b.ny[l] = p.ny, b.nz[l] = p.nz, inverse[l] = p.inverse;
     }
     return listed;
 }
 
 /// Which side of A the points of B lie on, where both clusters have weight: below, the liquid between them is thin, above,
-/// the air is. Seldom asked: summed with the rest it would cost a tenth of the blend.
+/// the air is. Seldom asked: summed with the rest it would cost a tenth of the blend. `nearest`: of the candidates.
 template <bool fused>
-RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const float* height,
-                           float* out) {
-    alignas(64) float side[lanes] = {};
+RILL_INLINE void find_side(const Field& f, const uint32_t* list, uint32_t count, const Batch& b, const uint32_t* candidates,
+                           const int32_t* nearest, float* out) {
+    alignas(64) float side[lanes] = {}, height[lanes];
+    for (uint32_t l = 0; l < lanes; ++l) {
+        const Patch& p = f.patches[candidates[nearest[l]]];
+        height[l] = dot<fused>(p.nx, p.ny, p.nz, b.x[l] - p.x, b.y[l] - p.y, b.z[l] - p.z);
+    }
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];
         for (uint32_t l = 0; l < lanes; ++l) {
@@ -205,12 +209,13 @@ RILL_INLINE uint32_t confirm_doubts(const Field& f, const uint32_t* list, uint32
 template <bool fused>
 RILL_INLINE uint32_t blend(const Field& f, const uint32_t* candidates, uint32_t candidate_count, uint32_t* list, uint32_t& listed,
                            float trusted_value, Batch& b) {
-    alignas(64) float height[lanes], inverse[lanes], side[lanes] = {};
+    alignas(64) float inverse[lanes], side[lanes] = {};
+    alignas(64) int32_t nearest[lanes];
     Sums sums;
-    listed = find_nearest<fused>(f, candidates, candidate_count, list, b, height, inverse);
+    listed = find_nearest<fused>(f, candidates, candidate_count, list, b, nearest, inverse);
     const uint32_t count = listed < most_listed ? listed : most_listed;
     sum_up<fused>(f, list, count, b, sums);
-    if (greatest_of(sums.weight_b) > 0) find_side<fused>(f, list, count, b, height, side);
+    if (greatest_of(sums.weight_b) > 0) find_side<fused>(f, list, count, b, candidates, nearest, side);
     constexpr float least_weight = 1e-30f;
     // A condition asked twice in a loop would become a branch.
     alignas(64) float value_a[lanes], value_b[lanes], take[lanes];  // take > 0: cluster B

@@ -8,12 +8,14 @@
 namespace rill::surface::inner {
 
 /// Adds to `rows` (y + 8 z; bit x) the cells whose middles lie within `radius` of the centre and nearer to the plane than
-/// half a cell reaches; all in cells from the lowest corner of the block. The curvature of so small a disc is not looked at.
+/// `deep` of what a cell reaches; all in cells from the lowest corner of the block. The curvature of so small a disc is not looked at.
+/// Cells that the plane but grazes are left to the march: with half of the reach, and discs wider by half a cell, an eighth of the cells
+/// asked for were none of the surface's, not a twentieth, and corners took 3 to 4 % more batches.
 RILL_INLINE void draw_disc(const float centre[3], const float normal[3], float radius, uint8_t rows[8 * 8]) {
-    constexpr float flat = 1e-6f;
+    constexpr float flat = 1e-6f, deep = 0.35f;
     const float px = centre[0] - 0.5f, py = centre[1] - 0.5f, pz = centre[2] - 0.5f;
     const float size = std::fabs(normal[0]) + std::fabs(normal[1]) + std::fabs(normal[2]);
-    const float inverse = 1 / (std::fabs(normal[0]) > flat ? normal[0] : flat), width = 0.5f * size * std::fabs(inverse);
+    const float inverse = 1 / (std::fabs(normal[0]) > flat ? normal[0] : flat), width = deep * size * std::fabs(inverse);
     const float from = greater(pz - radius, 0), to = lesser(pz + radius, 7);
     for (int pair = int(from) / 2; pair <= 3 && float(2 * pair) <= to; ++pair) {
         alignas(64) int32_t cells[lanes];
