@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstddef>
-#include <memory>
 
 #include "parallel.h"
 #include "surface/field_to_mesh.h"
@@ -12,15 +10,9 @@
 namespace rill::cooker {
 namespace {
 
-/// Memory as it comes, not zeroed: most is never touched.
-template <class T>
-std::unique_ptr<T[]> raw(size_t count) {
-    return std::make_unique_for_overwrite<T[]>(count);
-}
-/// In 64-byte alignment.
-void* aligned(std::unique_ptr<std::byte[]>& memory, size_t bytes) {
-    memory = raw<std::byte>(bytes + 64);
-    return reinterpret_cast<void*>((reinterpret_cast<uintptr_t>(memory.get()) + 63) & ~uintptr_t(63));
+/// Not zeroed: most is never touched.
+std::unique_ptr<CacheLine[]> lines_for(size_t bytes) {
+    return std::make_unique_for_overwrite<CacheLine[]>((bytes + sizeof(CacheLine) - 1) / sizeof(CacheLine));
 }
 
 /// The stages of the mesher on as many threads as it has workers.
@@ -53,7 +45,8 @@ PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) {
     }
     const format::PointSet set{n, rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), rows_[4].data(),
                                rows_[5].data(), rows_[6].data(), rows_[7].data(), rows_[8].data(), rows_[9].data()};
-    surface::begin_field(field, aligned(memory_, surface::field_bytes(n, 0)), set, format::DropSet{});
+    memory_ = lines_for(surface::field_bytes(n, 0));
+    surface::begin_field(field, memory_.get(), set, format::DropSet{});
     constexpr uint32_t batch = 256;
     parallel_for((field.point_count + batch - 1) / batch, jobs, [&](size_t part) {
         surface::fit_patches(field, uint32_t(part) * batch, std::min(field.point_count, uint32_t(part + 1) * batch));
@@ -78,15 +71,15 @@ std::vector<float> PointField::values_at(const std::vector<float>& x, const std:
 Mesh mesh_points(const std::vector<SurfacePoint>& points, float cell, int jobs, size_t about) {
     const PointField decoded(points, jobs);
     const uint32_t workers = uint32_t(threads_of(jobs));
-    std::unique_ptr<std::byte[]> memory;
     std::unique_ptr<uint32_t[]> indices;
     Mesh mesh;
     Target target{};
     constexpr uint32_t most = 1u << 26;
     for (uint32_t vertices = uint32_t(std::clamp<size_t>(about + about / 4, 1u << 12, most));; vertices = std::min(2 * vertices, most)) {
         const MeshLimits limits{vertices, 0, 0, workers};
-        Mesher* mesher = place_mesher(aligned(memory, mesher_bytes(limits)), limits);
-        mesh.positions.resize(vertices), indices = raw<uint32_t>(size_t(vertices) * 8);
+        const std::unique_ptr<CacheLine[]> memory = lines_for(mesher_bytes(limits));
+        Mesher* mesher = place_mesher(memory.get(), limits);
+        mesh.positions.resize(vertices), indices = std::make_unique_for_overwrite<uint32_t[]>(size_t(vertices) * 8);
         target.position = {mesh.positions.data(), sizeof(glm::vec3)};
         target.indices = indices.get();
         target.vertex_capacity = vertices, target.index_capacity = vertices * 8;

@@ -11,6 +11,11 @@
 
 namespace rill::cooker {
 
+/// What the runtime's memory is made of: it wants 64-byte alignment.
+struct alignas(64) CacheLine {
+    std::byte bytes[64];
+};
+
 /// The runtime's field over a vector of points, memory included. Drops are left out.
 class PointField {
 public:
@@ -22,7 +27,7 @@ public:
 
 private:
     std::vector<float> rows_[10];
-    std::unique_ptr<std::byte[]> memory_;
+    std::unique_ptr<CacheLine[]> memory_;
 };
 
 /// The runtime's mesh of the points, with cells of that size (metres): positions and triangles.

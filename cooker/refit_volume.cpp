@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Heights chosen anew where few points make a piece of liquid, or it is thin. How each is rounded is chance, and where no thousand
-// others make up for it the piece's volume is off by as much: a ball of 39 points, pour_sphere 1, by .8 %. So mean heights go up or down by a step of the lattice,
-// of those tracks first that the surface is the better for or hardly the worse, until the volume of every such piece is about the source's.
+// others make up for it the piece's volume is off by as much: a ball of 39 points, pour_sphere 1, by .8 %. So mean heights go up or
+// down by a step of the lattice, of those tracks first that the surface is the better for or hardly the worse, until the volume of
+// every such piece is about the source's.
 // What that gains: README.md, "Drops and bubbles". Pieces meshed by themselves, to save time, have other supports than beside the rest: they
 // came out up to a quarter too large.
 #include <algorithm>
