@@ -115,6 +115,11 @@ inline void add_sphere(Cloud& c, const Vec& centre, double radius, int n) {
         c.add(centre + radius * d, d, 2.0 * d);
     }
 }
+inline Cloud sphere_cloud(int n) {
+    Cloud c;
+    add_sphere(c, {0, 0, 0}, 1, n);
+    return c;
+}
 inline void add_torus(Cloud& c, double major, double minor, int n) {
     for (int i = 0; i < n; ++i) {
         const double u = 2 * pi * i / n;
