@@ -123,6 +123,31 @@ TEST_CASE("patch tables: every pattern closes, and only 36 have a doubled face")
     CHECK(doubled == 36);
 }
 
+TEST_CASE("patch tables: a walk round each patch takes all of its edges once, whatever faces are turned") {
+    for (uint32_t signs = 0; signs < 256; ++signs)
+        for (uint32_t turned = 0; turned < 64; ++turned) {
+            const CellPattern pattern = pattern_of(signs, turned);
+            const CellPatches patches = patches_of(pattern);
+            uint32_t walked = 0;
+            for (uint32_t p = 0; p < patches.count; ++p) {
+                const Ring ring = ring_of(pattern, patches, p);
+                CHECK(ring.count >= 3);
+                uint32_t edges = 0;
+                for (uint32_t k = 0; k < ring.count; ++k) {
+                    // The edge that the walk leaves by this face, from the other side: the face's two bits of it agree.
+                    const uint32_t edge = patches_detail::edge_beyond(ring.edge[k], ring.face[k]);
+                    edges |= 1u << edge;
+                    CHECK(patches.patch[edge] == p);
+                    CHECK(patches_detail::face_after(signs, edge) == ring.face[k]);
+                }
+                CHECK((edges & ~uint32_t(patches.crossed)) == 0);
+                CHECK((walked & edges) == 0);
+                walked |= edges;
+            }
+            CHECK(walked == patches.crossed);
+        }
+}
+
 TEST_CASE("sphere: closed, outward, within bounds") {
     Cloud cloud = sphere_cloud(600);
     const RealField real(cloud);

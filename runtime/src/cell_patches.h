@@ -66,27 +66,37 @@ struct Joined {
             if (r == from) r = to;
     }
 };
-constexpr void join_face(Joined& joined, uint32_t inside, const Face& f, bool turned) {
+/// The edge of a face that one of its sign-changing edges is joined with. An ambiguous face cuts off its inside corners
+/// (`turned`: the outside ones): each joins the edges before and after it.
+constexpr uint32_t edge_across(uint32_t inside, uint32_t face, bool turned, uint32_t edge) {
+    const Face f = face_of(face);
+    uint32_t k = 0;
+    while (f.edge[k] != edge) ++k;
     if (ambiguous(inside, f)) {
-        // Cut off the inside corners (turned: the outside ones): join the edges before and after each.
-        const bool first = bool((inside >> f.corner[0]) & 1) != turned;
-        joined.join(f.edge[first ? 3 : 0], f.edge[first ? 0 : 1]);
-        joined.join(f.edge[first ? 1 : 2], f.edge[first ? 2 : 3]);
-        return;
+        const bool begins_cut = bool((inside >> f.corner[k]) & 1) != turned;  // the corner before the edge, or the one after
+        return f.edge[(k + (begins_cut ? 3 : 1)) % 4];
     }
-    uint32_t before = 12;
-    for (uint32_t edge : f.edge) {
-        if (!crossed(inside, edge)) continue;
-        if (before < 12) joined.join(before, edge);
-        before = edge;
-    }
+    uint32_t other = (k + 1) % 4;
+    while (!crossed(inside, f.edge[other])) other = (other + 1) % 4;
+    return f.edge[other];
 }
+
+/// The face that a patch leaves an edge by, walked counter-clockwise seen from the air.
+constexpr uint32_t face_after(uint32_t signs, uint32_t edge) {
+    const uint32_t axis = edge / 4, u = 2 * ((axis + 1) % 3) + (edge & 1), v = 2 * ((axis + 2) % 3) + (edge >> 1 & 1);
+    const bool liquid_below = signs >> edge_corner(edge) & 1, same_side = (edge & 1) == (edge >> 1 & 1);
+    return same_side == liquid_below ? v : u;
+}
+/// The same edge in the numbers of the cell beyond one of its faces.
+constexpr uint32_t edge_beyond(uint32_t edge, uint32_t face) { return edge ^ (face / 2 == (edge / 4 + 1) % 3 ? 1u : 2u); }
 
 /// `turned`: bits of the faces whose ambiguity is treated the other way.
 constexpr CellPatches trace(uint32_t inside, uint32_t turned) {
     Joined joined;
     for (uint32_t e = 0; e < 12; ++e) joined.root[e] = e;
-    for (uint32_t f = 0; f < 6; ++f) join_face(joined, inside, face_of(f), turned >> f & 1);
+    for (uint32_t f = 0; f < 6; ++f)
+        for (uint32_t edge : face_of(f).edge)
+            if (crossed(inside, edge)) joined.join(edge, edge_across(inside, f, turned >> f & 1, edge));
     CellPatches cell;
     uint32_t name[12] = {};
     for (uint32_t e = 0; e < 12; ++e) {
@@ -122,8 +132,8 @@ inline constexpr std::array<CellPatches, 512> cell_patches = patches_detail::tra
 /// How a cell is divided: its signs, and bits of the faces that are turned. Fits 14 bits.
 struct CellPattern {
     uint16_t bits;
-    uint32_t signs() const { return bits & 255; }
-    uint32_t turned() const { return uint32_t(bits) >> 8; }
+    constexpr uint32_t signs() const { return bits & 255; }
+    constexpr uint32_t turned() const { return uint32_t(bits) >> 8; }
 };
 constexpr CellPattern pattern_of(uint32_t signs, uint32_t turned) { return {uint16_t(signs | turned << 8)}; }
 /// From the table wherever cells are of one size; traced anew for the few on borders with others.
@@ -135,6 +145,29 @@ inline CellPatches patches_of(CellPattern pattern) {
 }
 inline uint32_t patch_of(CellPattern pattern, uint32_t edge) {
     return pattern.turned() ? patches_of(pattern).patch[edge] : cell_patches[pattern.signs()].patch[edge];
+}
+
+/// What stands round the vertex of a patch, in order, counter-clockwise seen from the air: the vertices beyond its faces. Of a face
+/// that the patch crosses twice, twice.
+struct Ring {
+    static constexpr uint32_t most = 12;
+    uint8_t count = 0;
+    uint8_t face[most] = {};
+    uint8_t edge[most] = {};  ///< of the cell beyond the face: one that the patch crosses
+};
+
+/// Of one of the pattern's patches.
+constexpr Ring ring_of(CellPattern pattern, const CellPatches& patches, uint32_t patch) {
+    Ring ring;
+    uint32_t first = 0;
+    while (first < 12 && !(patches.crossed >> first & 1 && patches.patch[first] == patch)) ++first;
+    for (uint32_t edge = first; first < 12 && ring.count < Ring::most;) {
+        const uint32_t face = patches_detail::face_after(pattern.signs(), edge);
+        ring.face[ring.count] = uint8_t(face), ring.edge[ring.count++] = uint8_t(patches_detail::edge_beyond(edge, face));
+        edge = patches_detail::edge_across(pattern.signs(), face, pattern.turned() >> face & 1, edge);
+        if (edge == first) break;
+    }
+    return ring;
 }
 
 }  // namespace rill

@@ -133,40 +133,47 @@ bool is_inside(const surface::Container& container, const Tile& tile) {
     return inside;
 }
 
-/// Evaluates the corners of the pending cells that are not known yet.
-void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
-    uint16_t need[81] = {};
+/// Corners of the pending cells, by row. Rows are spread over y and then over z, eight at a time.
+void corners_of_pending(const Tile& tile, uint16_t (&need)[81]) {
+    uint16_t spread[8][10] = {};  // y from −1 on
     for (uint32_t z = 0; z < 8; ++z)
-        for (uint32_t y = 0; y < 8; ++y) {
-            const uint32_t p = tile.pending[y + 8 * z], row = y + 9 * z;
-            const uint16_t corners = uint16_t(p | p << 1);
-            need[row] |= corners, need[row + 1] |= corners, need[row + 9] |= corners,
-                need[row + 10] |= corners;
-        }
-    uint16_t hanging[81] = {};
-    const bool mixed = (tile.beside & every_coarser) != 0;
-    if (mixed) find_hanging(tile, hanging), need_parents(hanging, need);
-    uint16_t missing[81];
-    for (uint32_t row = 0; row < 81; ++row) missing[row] = uint16_t(need[row] & ~(tile.known[row] | hanging[row]));
+        for (uint32_t y = 0; y < 8; ++y) spread[z][y + 1] = uint16_t(tile.pending[y + 8 * z] | tile.pending[y + 8 * z] << 1);
+    uint16_t layer[10][9] = {};  // z from −1 on
+    for (uint32_t z = 0; z < 8; ++z)
+        for (uint32_t y = 0; y < 9; ++y) layer[z + 1][y] = spread[z][y] | spread[z][y + 1];
+    for (uint32_t z = 0; z < 9; ++z)
+        for (uint32_t y = 0; y < 9; ++y) need[y + 9 * z] = layer[z][y] | layer[z + 1][y];
+}
+
+/// Makes a batch of corners, octant by octant, so that sixteen in a row lie close together. Returns how many.
+uint32_t list_corners(MesherScratch& s, const Tile& tile, const uint16_t (&rows)[81]) {
     float place[3][tile_corners];
     for (uint32_t a = 0; a < 3; ++a)
-        for (uint32_t k = 0; k < tile_corners; ++k) place[a][k] = corner_at(tile, a, k);
+        for (int k = 0; k < tile_corners; ++k) place[a][k] = corner_at(tile, a, k);
     uint32_t n = 0;
-    // Octant by octant, so that batches are compact.
     for (uint32_t octant = 0; octant < 8; ++octant) {
-        const uint32_t from_y = octant & 2 ? 5 : 0, to_y = octant & 2 ? 9 : 5;
-        const uint32_t from_z = octant & 4 ? 5 : 0, to_z = octant & 4 ? 9 : 5;
-        for (uint32_t z = from_z; z < to_z; ++z)
-            for (uint32_t y = from_y; y < to_y; ++y) {
-                const uint32_t row = y + 9 * z;
-                const uint32_t bits = missing[row] & (octant & 1 ? 0x1e0 : 0x01f);
-                if (!bits) continue;
-                const float py = place[1][y], pz = place[2][z];
-                for_bits(bits, [&](uint32_t x) {
-                    s.x[n] = place[0][x], s.y[n] = py, s.z[n] = pz, s.slot[n++] = uint16_t(x | row << 4);
-                });
-            }
+        const uint32_t first_x = octant & 1 ? 5 : 0, first_y = octant & 2 ? 5 : 0, first_z = octant & 4 ? 5 : 0;
+        const uint32_t last_y = first_y ? 9 : 5, last_z = first_z ? 9 : 5;
+        for (uint32_t z = first_z; z < last_z; ++z) {
+            uint32_t bits = 0;  // five by five at most
+            for (uint32_t y = first_y; y < last_y; ++y) bits |= (rows[y + 9 * z] >> first_x & 31u) << 5 * (y - first_y);
+            for_bits(bits, [&](uint32_t k) {
+                const uint32_t x = first_x + k % 5, y = first_y + k / 5;
+                s.x[n] = place[0][x], s.y[n] = place[1][y], s.z[n] = place[2][z], s.slot[n++] = uint16_t(x | (y + 9 * z) << 4);
+            });
+        }
     }
+    return n;
+}
+
+/// Evaluates the corners of the pending cells that are not known yet.
+void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
+    uint16_t need[81], hanging[81] = {}, missing[81];
+    corners_of_pending(tile, need);
+    const bool mixed = (tile.beside & every_coarser) != 0;
+    if (mixed) find_hanging(tile, hanging), need_parents(hanging, need);
+    for (uint32_t row = 0; row < 81; ++row) missing[row] = uint16_t(need[row] & ~(tile.known[row] | hanging[row]));
+    const uint32_t n = list_corners(s, tile, missing);
     for (uint32_t row = 0; row < 81; ++row) tile.known[row] |= missing[row];
     s.corners_evaluated += n;
     const surface::Field& field = is_inside(m.input.field->container, tile) ? m.uncut : *m.input.field;

@@ -23,6 +23,12 @@ enum Beside : uint32_t { beside_same = 0, beside_coarser = 1, beside_finer = 2 }
 inline constexpr uint64_t every_coarser = 0x15555555555555, every_finer = 2 * every_coarser;  ///< of 27 places
 constexpr uint32_t place_of(int x, int y, int z) { return uint32_t(x + 1 + 3 * (y + 1) + 9 * (z + 1)); }
 
+/// What is left of a tile's surface cells when its vertices are placed.
+struct PlacedCells {
+    uint16_t vertex[cells_per_tile];  ///< the first of each, from the tile's first
+    CellPattern pattern[cells_per_tile];
+};
+
 /// Cells are addressed by row = y + 8 z and bit x, corners by row = y + 9 z and bit x. Corners on a shared
 /// face stand in both tiles, with the same bits whoever evaluates them: the field is a pure function of x.
 struct Tile {
@@ -46,10 +52,7 @@ struct Tile {
     Beside at_place(uint32_t place) const { return Beside(beside >> (2 * place) & 3); }
     union {
         float value[corners_per_tile];  ///< until the vertices are placed
-        struct {
-            uint16_t vertex[cells_per_tile];   ///< first vertex of each surface cell, from first_vertex
-            CellPattern pattern[cells_per_tile];
-        } placed;
+        PlacedCells placed;
     };
 };
 
@@ -88,12 +91,15 @@ struct MesherScratch {
     float x[capacity], y[capacity], z[capacity];
     uint16_t slot[capacity];
     float value[capacity], gx[capacity], gy[capacity], gz[capacity], velocity[3 * capacity];
+    // Of a vertex: how far it goes against its gradient, over that; 1 / |gradient|; where it ends, and the normal there.
+    float step[capacity], scale[capacity], to[3][capacity], normal[3][capacity];
+    uint16_t at[capacity];       ///< its cell
+    uint8_t of_field[capacity];  ///< as Vertex::of_field
     // By slot, never reordered: the cell of a vertex, and which of its patches.
     uint16_t cell[capacity];
     uint8_t patch[capacity];
     uint16_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, meets_free, nears_wall, nears_edge
-    uint16_t vertex[cells_per_tile];
-    CellPattern pattern[cells_per_tile];
+    PlacedCells placed;        ///< of a tile whose corner values are not used up yet
     ParentCells parents;
     uint64_t corners_evaluated;
 };
@@ -175,7 +181,8 @@ uint32_t find_beyond(const Mesher& m, const Tile& tile, uint32_t face) noexcept;
 uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) noexcept;
 /// The leaf that holds a position; false when that is out of reach.
 bool leaf_at(const Mesher& m, const float position[3], int32_t& level, int32_t coord[3]) noexcept;
-float corner_at(const Tile& tile, uint32_t axis, int32_t corner) noexcept;
+/// Its place along an axis, metres.
+inline float corner_at(const Tile& tile, uint32_t axis, int32_t corner) { return float(tile_cells * tile.coord[axis] + corner) * tile.cell; }
 /// Of a cube: at least in part.
 bool in_sight(const Mesher& m, const float centre[3], float half) noexcept;
 /// Puts it into the list of the coming round.
@@ -236,6 +243,26 @@ uint32_t prepare_counts(void* mesher);
 void run_counts(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_vertices(void* mesher);
 void run_vertices(void* mesher, uint32_t task, uint32_t worker);
+
+// vertices_at_walls.cpp: vertices whose cells walls come near to
+/// Where a cell's edges are crossed, as a share of each from its lower end; 0 for edges that are not.
+struct CellCrossings {
+    float share[12];
+};
+/// Of what the crossings of a patch lie in: a surface that is no wall. Of what its cell is near to: a wall; two of them.
+inline constexpr uint32_t meets_free = 1u << 6, nears_wall = 1u << 7, nears_edge = 1u << 8;
+/// The walls that come near to a tile.
+struct NearWalls {
+    uint32_t sides;            ///< bits
+    float reach, place[6];     ///< as near as that; where they are. In cells
+};
+NearWalls walls_near(const Mesher& m, const Tile& tile) noexcept;
+/// What a patch of a cell meets and is near to, of those. `corner`: of the cell, in cells.
+uint32_t walls_met(const NearWalls& walls, const CellPatches& patches, uint32_t patch, const CellCrossings& crossings,
+                   const float (&corner)[3]) noexcept;
+/// Places a vertex of a batch, evaluated and with its step not taken, on the field and the walls that it meets: s.to, s.normal and
+/// s.of_field. False if it has no normal.
+bool step_at_walls(const Mesher& m, MesherScratch& s, const Tile& tile, uint32_t i) noexcept;
 
 // vertices_to_normals.cpp
 uint32_t prepare_normals(void* mesher);

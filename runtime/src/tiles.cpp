@@ -138,10 +138,6 @@ uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) n
     return m.tile_count - 1;
 }
 
-float corner_at(const Tile& tile, uint32_t axis, int32_t corner) noexcept {
-    return float(tile_cells * tile.coord[axis] + corner) * tile.cell;
-}
-
 void list_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept {
     surface::Box box;
     for (uint32_t a = 0; a < 3; ++a)

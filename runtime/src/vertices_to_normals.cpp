@@ -22,31 +22,10 @@ namespace {
 
 constexpr float triangles_share = 0.4f;
 
-/// What stands round the vertex of a patch: a vertex beyond each face that the patch crosses, and for each edge that it crosses a
-/// triangle, of the vertex and of those beyond the edge's two faces.
-struct Ring {
-    uint8_t faces = 0;                   ///< bits
-    uint8_t triangles = 0;
-    uint8_t edge[6] = {};                ///< by face: an edge of the cell beyond it that the patch crosses
-    uint8_t first[12] = {}, second[12] = {};  ///< faces of a triangle, counter-clockwise seen from the air
-};
-constexpr Ring ring_of(uint32_t signs, const CellPatches& patches, uint32_t patch) {
-    Ring ring;
-    for (uint32_t e = 0; e < 12; ++e) {
-        if (!(patches.crossed >> e & 1) || patches.patch[e] != patch) continue;
-        const uint32_t axis = e / 4, u = 2 * ((axis + 1) % 3) + (e & 1), v = 2 * ((axis + 2) % 3) + (e >> 1 & 1);
-        ring.faces = uint8_t(ring.faces | 1u << u | 1u << v);
-        ring.edge[u] = uint8_t(e ^ 1), ring.edge[v] = uint8_t(e ^ 2);
-        const bool liquid_below = signs >> patches_detail::edge_corner(e) & 1, same_side = (e & 1) == (e >> 1 & 1);
-        ring.first[ring.triangles] = uint8_t(same_side == liquid_below ? u : v);
-        ring.second[ring.triangles++] = uint8_t(same_side == liquid_below ? v : u);
-    }
-    return ring;
-}
 /// By corner signs: of the first patch, mostly the only one.
 constexpr std::array<Ring, 256> first_rings() {
     std::array<Ring, 256> rings{};
-    for (uint32_t signs = 0; signs < 256; ++signs) rings[signs] = ring_of(signs, cell_patches[signs], 0);
+    for (uint32_t signs = 0; signs < 256; ++signs) rings[signs] = ring_of(pattern_of(signs, 0), cell_patches[signs], 0);
     return rings;
 }
 constexpr std::array<Ring, 256> rings = first_rings();
@@ -78,28 +57,27 @@ struct TileNormals {
 
     /// The normal of a vertex, `own` by the field, leant towards that of what stands round it.
     Vector lean(const Vector& own, const Ring& ring, uint32_t cell, uint32_t self) const {
-        constexpr float part[7] = {0, 1, 1 / 2.f, 1 / 3.f, 1 / 4.f, 1 / 5.f, 1 / 6.f};
-        const Vector here = load(m.position + 3 * size_t(self));
-        Vector to[6], around{};
-        uint32_t count = 0;
-        for_bits(ring.faces, [&](uint32_t face) {
-            const size_t other = 3 * size_t(vertex_beyond(cell, face, ring.edge[face], self));
-            to[face] = load(m.position + other) - here, around = around + load(m.normal + other), ++count;
-        });
+        Vector at[Ring::most + 1], around{};
+        for (uint32_t k = 0; k < ring.count; ++k) {
+            const size_t other = 3 * size_t(vertex_beyond(cell, ring.face[k], ring.edge[k], self));
+            at[k] = load(m.position + other), around = around + load(m.normal + other);
+        }
+        at[ring.count] = at[0];
+        // The triangles to the vertex add up to any others between those round it: two of them are the product of diagonals.
         Vector area{};
-        for (uint32_t k = 0; k < ring.triangles; ++k) area = area + cross(to[ring.first[k]], to[ring.second[k]]);
-        const float area2 = dot(area, area), leant = still_here(here), share = triangles_share * leant;
+        for (uint32_t k = 1; k + 1 < ring.count; k += 2) area = area + cross(at[k + 1] - at[0], at[k + 2] - at[k]);
+        const float area2 = dot(area, area), leant = still_here(self), share = triangles_share * leant;
         if (!(area2 > 0)) return own;
-        const Vector gradient = (1 - 0.5f * leant) * own + 0.5f * leant * part[count] * around;
+        const Vector gradient = (1 - 0.5f * leant) * own + 0.5f * leant / float(ring.count) * around;
         const Vector sum = (1 - share) * gradient + share / std::sqrt(area2) * area;
         const float length2 = dot(sum, sum);
         return length2 > 1e-4f ? 1 / std::sqrt(length2) * sum : own;
     }
 
-    /// How much of what is drawn at a place is not that of larger cells.
-    float still_here(const Vector& place) const {
-        const float at[3] = {place.x, place.y, place.z};
-        return m.input.levels.eye_count ? 1 - m.input.levels.morph(tile.level, at) : 1;
+    /// How much of what is drawn at a vertex is not that of larger cells.
+    float still_here(uint32_t vertex) const {
+        if (!m.input.levels.eye_count) return 1;
+        return 1 - m.input.levels.morph(tile.level, m.position + 3 * size_t(vertex));
     }
 
     void write(const Ring& ring, uint32_t cell, uint32_t self) const {
@@ -116,7 +94,7 @@ struct TileNormals {
             return;
         }
         const CellPatches patches = patches_of(pattern);
-        for (uint32_t p = 0; p < patches.count; ++p) write(ring_of(pattern.signs(), patches, p), cell, first + p);
+        for (uint32_t p = 0; p < patches.count; ++p) write(ring_of(pattern, patches, p), cell, first + p);
     }
 };
 

@@ -68,13 +68,13 @@ void add_drops(const Field& f, const uint32_t* candidates, uint32_t count, const
 void cut_at_bevels(const Container& container, const float* const position[3], uint32_t n, const Results& out) {
     float* const gradient[3] = {out.gx, out.gy, out.gz};
     for_bevels(container, [&](const Bevel& bevel) {
-        for (uint32_t i = 0; i < n; ++i) {
-            const float value = bevel.value(position[bevel.axis[0]][i], position[bevel.axis[1]][i]);
-            if (!(value > out.value[i])) continue;
-            out.value[i] = value;
-            for (int a = 0; a < 3 && out.gx; ++a) gradient[a][i] = 0;
-            for (int k = 0; k < 2 && out.gx; ++k) gradient[bevel.axis[k]][i] = bevel.outward[k];
+        const float *x = position[bevel.axis[0]], *y = position[bevel.axis[1]];
+        for (uint32_t i = 0; i < n && out.gx; ++i) {
+            if (!(bevel.value(x[i], y[i]) > out.value[i])) continue;
+            for (int a = 0; a < 3; ++a) gradient[a][i] = 0;
+            for (int k = 0; k < 2; ++k) gradient[bevel.axis[k]][i] = bevel.outward[k];
         }
+        for (uint32_t i = 0; i < n; ++i) out.value[i] = std::max(out.value[i], bevel.value(x[i], y[i]));
     });
 }
 
