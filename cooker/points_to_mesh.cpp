@@ -32,10 +32,9 @@ void run_stages(Mesher* mesher, uint32_t workers) {
 
 }  // namespace
 
-PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) {
-    const uint32_t n = uint32_t(points.size());
-    for (auto& row : rows_) row.resize(n);
-    for (uint32_t i = 0; i < n; ++i) {
+PointRows::PointRows(const std::vector<SurfacePoint>& points) {
+    for (auto& row : rows_) row.resize(points.size());
+    for (size_t i = 0; i < points.size(); ++i) {
         for (int a = 0; a < 3; ++a) {
             rows_[a][i] = points[i].position[a];
             rows_[3 + a][i] = points[i].normal[a];
@@ -43,10 +42,22 @@ PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) {
         }
         rows_[9][i] = 1;
     }
-    const format::PointSet set{n, rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), rows_[4].data(),
-                               rows_[5].data(), rows_[6].data(), rows_[7].data(), rows_[8].data(), rows_[9].data()};
-    memory_ = lines_for(surface::field_bytes(n, 0));
-    surface::begin_field(field, memory_.get(), set, format::DropSet{});
+}
+void PointRows::add_room(size_t count) {
+    for (auto& row : rows_) row.resize(row.size() + count, 0.f);
+}
+format::PointSet PointRows::set() {
+    return {uint32_t(rows_[0].size()), rows_[0].data(), rows_[1].data(), rows_[2].data(), rows_[3].data(), rows_[4].data(),
+            rows_[5].data(), rows_[6].data(), rows_[7].data(), rows_[8].data(), rows_[9].data()};
+}
+
+PointField::PointField(const std::vector<SurfacePoint>& points, size_t room) {
+    PointRows rows(points);
+    rows.add_room(room);
+    memory_ = lines_for(surface::field_bytes(uint32_t(points.size() + room), 0));
+    surface::begin_field(field, memory_.get(), rows.set(), format::DropSet{});
+}
+PointField::PointField(const std::vector<SurfacePoint>& points, int jobs) : PointField(points, size_t(0)) {
     constexpr uint32_t batch = 256;
     parallel_for((field.point_count + batch - 1) / batch, jobs, [&](size_t part) {
         surface::fit_patches(field, uint32_t(part) * batch, std::min(field.point_count, uint32_t(part + 1) * batch));

@@ -16,6 +16,18 @@ struct alignas(64) CacheLine {
     std::byte bytes[64];
 };
 
+/// Points row by row, as the runtime takes them, all of them active.
+class PointRows {
+public:
+    explicit PointRows(const std::vector<SurfacePoint>& points);
+    /// Inactive ones that follow.
+    void add_room(size_t count);
+    format::PointSet set();
+
+private:
+    std::vector<float> rows_[10];
+};
+
 /// The runtime's field over a vector of points, memory included. Drops are left out.
 class PointField {
 public:
@@ -25,8 +37,11 @@ public:
     /// Its value at each position, metres: negative in the liquid.
     std::vector<float> values_at(const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z) const;
 
+protected:
+    /// With room for so many more points; nothing is fitted yet.
+    PointField(const std::vector<SurfacePoint>& points, size_t room);
+
 private:
-    std::vector<float> rows_[10];
     std::unique_ptr<CacheLine[]> memory_;
 };
 

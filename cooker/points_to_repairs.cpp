@@ -9,8 +9,8 @@
 
 #include "parallel.h"
 #include "pipeline.h"
-#include "points_to_mesh.h"
 #include "torn_necks.h"
+#include "trial_field.h"
 
 namespace rill::cooker {
 namespace {
@@ -43,7 +43,9 @@ constexpr size_t most_candidates = 12;
 constexpr size_t most_repairs = 4;           // of a place; 6: splashes no better, +.9 to +3 %
 constexpr double least_share = 0.1, least_gain = 1, most_gain = 4;  // of confusion(): what a point must mend; a wide void is closed by small parts
 constexpr float same_side = 0.3f;         // cosine
-constexpr size_t points_per_place = 8;    // of a frame, at the least: where all is torn, points for all would not mend it
+// Of a frame, the worst: where all is torn, points for all would not mend it. Frames of pours and of sprays have up to 140 places; meshes of
+// bare particles, bumps of an edge everywhere, 800 of 12 000 points.
+constexpr size_t most_places = 160, points_per_place = 32;
 
 struct OffSurface {
     glm::vec3 position;
@@ -126,22 +128,25 @@ void find_candidates(const SurfaceFrame& frame, Place& place) {
     }
 }
 
-/// As far from x as all points count: metres.
-float near_at(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, const glm::vec3& x) {
-    if (points.size() <= enough_near) return near_by * frame.edge;
-    std::vector<float> away(points.size());
-    for (size_t i = 0; i < away.size(); ++i) away[i] = glm::distance(points[i].position, x);
-    std::nth_element(away.begin(), away.begin() + enough_near, away.end());
-    return std::clamp(away[enough_near], least_near * frame.edge, near_by * frame.edge);
+/// Of squared distances from a place: as far as all points count, metres.
+float near_of(const SurfaceFrame& frame, std::vector<float> away2) {
+    if (away2.size() <= enough_near) return near_by * frame.edge;
+    std::nth_element(away2.begin(), away2.begin() + enough_near, away2.end());
+    return std::clamp(std::sqrt(away2[enough_near]), least_near * frame.edge, near_by * frame.edge);
 }
 
 /// All points near x, and ever fewer of those farther away: enough for the winding number, in a time that does not grow with
 /// the frame.
 std::vector<SurfacePoint> points_around(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, const glm::vec3& x) {
-    const float near = near_at(frame, points, x);
+    std::vector<float> away2(points.size());
+    for (size_t i = 0; i < away2.size(); ++i) {
+        const glm::vec3 r = points[i].position - x;
+        away2[i] = glm::dot(r, r);
+    }
+    const float near = near_of(frame, away2);
     std::vector<SurfacePoint> around;
     for (size_t i = 0; i < points.size(); ++i) {
-        const float away = glm::distance(points[i].position, x) / near;
+        const float away = std::sqrt(away2[i]) / near;
         const uint32_t stride = away < 1 ? 1 : 1u << std::min(20, 3 * (std::ilogb(away) + 1));  // as many at any distance: by 2; the same figures
         if (uint32_t(i * 2654435761u) >> 12 & (stride - 1)) continue;
         around.push_back(points[i]);
@@ -149,10 +154,9 @@ std::vector<SurfacePoint> points_around(const SurfaceFrame& frame, const std::ve
     return around;
 }
 
-/// Integral, over the place's liquid and air that the points decode as the other, of its depth: edges, per probe of a least place.
-double confusion(const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points) {
+/// Integral, over the place's liquid and air that is decoded as the other, of its depth: edges, per probe of a least place.
+double confusion(const SurfaceFrame& frame, const Place& place, const PointField& decoded) {
     if (place.x.empty()) return 0;
-    const PointField decoded(points);
     const std::vector<float> value = decoded.values_at(place.x, place.y, place.z);
     double sum = 0, torn = 0;
     for (size_t i = 0; i < value.size(); ++i)
@@ -193,11 +197,11 @@ std::vector<Trial> pairs(const std::vector<SurfacePoint>& candidates) {
 }
 
 /// Fills in the trials' confusion; the least, or none.
-Trial best_of(std::vector<Trial>& trials, const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points, int jobs) {
+Trial best_of(std::vector<Trial>& trials, const SurfaceFrame& frame, const Place& place, TrialFields& fields, int jobs) {
     parallel_for(trials.size(), jobs, [&](size_t k) {
-        std::vector<SurfacePoint> with = points;
-        for (size_t i : trials[k].taken) with.push_back(place.candidates[i]);
-        trials[k].confusion = confusion(frame, place, with);
+        std::vector<SurfacePoint> added;
+        for (size_t i : trials[k].taken) added.push_back(place.candidates[i]);
+        fields.with(added, [&](const PointField& decoded) { trials[k].confusion = confusion(frame, place, decoded); });
     });
     const auto less = [](const Trial& a, const Trial& b) { return a.confusion < b.confusion; };
     const auto best = std::min_element(trials.begin(), trials.end(), less);
@@ -206,12 +210,12 @@ Trial best_of(std::vector<Trial>& trials, const SurfaceFrame& frame, const Place
 
 /// The first trial that pays of a pair and more candidates, best first; or the last one.
 template <typename Pays>
-Trial best_together(const SurfaceFrame& frame, const Place& place, const std::vector<SurfacePoint>& points, size_t most, Pays pays, int jobs) {
+Trial best_together(const SurfaceFrame& frame, const Place& place, TrialFields& fields, size_t most, Pays pays, int jobs) {
     std::vector<Trial> trials = pairs(place.candidates);
-    Trial best = best_of(trials, frame, place, points, jobs);
+    Trial best = best_of(trials, frame, place, fields, jobs);
     while (!best.taken.empty() && !pays(best) && best.taken.size() < most) {
         trials = with_one_more(place, best);
-        best = best_of(trials, frame, place, points, jobs);
+        best = best_of(trials, frame, place, fields, jobs);
     }
     return best;
 }
@@ -219,9 +223,12 @@ Trial best_together(const SurfaceFrame& frame, const Place& place, const std::ve
 /// Takes candidates that mend the place, best first, into `points`; several at once where no single one does.
 void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
     const bool all = place.radius > wide * frame.edge;
-    std::vector<SurfacePoint> around = all ? points : points_around(frame, points, place.centre);
-    if (place.neck) place.torn = PointField(around).values_at(place.neck->x, place.neck->y, place.neck->z);
-    double now = confusion(frame, place, around);
+    TrialFields fields(all ? points : points_around(frame, points, place.centre), most_repairs);
+    double now = 0;
+    fields.with({}, [&](const PointField& decoded) {
+        if (place.neck) place.torn = decoded.values_at(place.neck->x, place.neck->y, place.neck->z);
+        now = confusion(frame, place, decoded);
+    });
     const double gain = place.neck ? least_neck_gain : least_gain;
     if (now >= gain) find_candidates(frame, place);  // else no trial could pay: three places of four at fine errors
     for (size_t taken = 0; taken < most_repairs && !place.candidates.empty();) {
@@ -230,15 +237,16 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
         if (most == 0) return;
         const auto pays = [&](const Trial& trial) { return now - trial.confusion >= double(trial.taken.size()) * least; };
         std::vector<Trial> alone = with_one_more(place, {});
-        Trial best = best_of(alone, frame, place, around, jobs);
-        if (!pays(best) && most > 1) best = best_together(frame, place, around, most, pays, jobs);
+        Trial best = best_of(alone, frame, place, fields, jobs);
+        if (!pays(best) && most > 1) best = best_together(frame, place, fields, most, pays, jobs);
         if (!pays(best)) return;
-        std::vector<SurfacePoint> left;
+        std::vector<SurfacePoint> left, born;
         for (size_t i = 0; i < place.candidates.size(); ++i) {
             const SurfacePoint& p = place.candidates[i];
-            if (std::find(best.taken.begin(), best.taken.end(), i) != best.taken.end()) around.push_back(p), points.push_back(p);
+            if (std::find(best.taken.begin(), best.taken.end(), i) != best.taken.end()) born.push_back(p);
             else if (best.taken.size() > 1 || alone[i].confusion < now) left.push_back(p);  // who would have mended nothing will not later
         }
+        fields.keep(born), points.insert(points.end(), born.begin(), born.end());
         taken += best.taken.size(), now = best.confusion, place.candidates = std::move(left);
     }
 }
@@ -258,7 +266,7 @@ std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const st
     for (const OffSurface& off : find_off(frame, decoded, pieces.index, beyond, jobs)) {
         const auto near = [&](const Place& p) { return !p.neck && glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(places.begin(), places.end(), near)) continue;
-        if (places.size() > points.size() / points_per_place) break;
+        if (places.size() >= std::max(most_places, points.size() / points_per_place)) break;
         Place& place = places.emplace_back();
         const float wide_as = is_thin(frame, off.position) ? 0 : off.distance + around_void * frame.edge;
         place.centre = off.position, place.radius = std::max(least_radius * frame.edge, wide_as);

@@ -38,19 +38,10 @@ struct Member {
 };
 struct Piece {
     double volume = 0, missing = 0, near = 0;  ///< of the source, m³; of that, what the decoded piece lacks, and may
-    double before = INFINITY, left = 0;        ///< beyond(), a round ago; what the steps that are taken now leave of `missing`
+    double before = INFINITY;                  ///< beyond() of what was missing a round ago
     std::vector<Member> members;
     /// How much of it counts: of what is missing, or too much.
     double beyond(double now) const { return std::max(std::fabs(now) - near, 0.0); }
-    bool is_off() const { return beyond(left) > 0; }
-};
-
-/// What a step up of one track's mean height does.
-struct Step {
-    std::vector<std::pair<Piece*, double>> grown;  ///< and how much less is missing there
-    double pull = 0, square = 0;  ///< half the slope and half the curvature of squared distance
-    bool taken = false;
-    double harm(int way) const { return std::max(square + 2 * way * pull, least_harm * square); }
 };
 
 /// The source's pieces of liquid that few of a frame's points make, and what these decode to.
@@ -123,32 +114,89 @@ private:
     std::vector<std::pair<uint32_t, uint32_t>> member_;  ///< piece, and which of it, of those
 };
 
-/// What a step takes away from Σ beyond².
-double gain(const Step& step, int way) {
-    double sum = 0;
-    for (const auto& [piece, grown] : step.grown) {
-        const double now = piece->beyond(piece->left), then = piece->beyond(piece->left - way * grown);
-        sum += now * now - then * then;
-    }
-    return sum;
-}
-
-/// The best step that is left, and its way: the one that harms least of those that mend much.
-std::pair<size_t, int> best_step(const std::vector<Step>& steps) {
-    double most = 0;
-    for (const Step& step : steps)
-        for (const int way : {-1, 1})
-            if (!step.taken) most = std::max(most, gain(step, way));
-    std::pair<size_t, int> best{0, 0};
-    double least = INFINITY;
-    for (size_t i = 0; i < steps.size() && most > 0; ++i)
-        for (const int way : {-1, 1}) {
-            if (steps[i].taken) continue;
-            const double mended = gain(steps[i], way), harm = steps[i].harm(way) / mended;
-            if (mended >= enough * most && harm < least) least = harm, best = {i, way};
+/// The steps that there are: what each does to which pieces, all in a row, for all of them are looked through for every one taken.
+class Steps {
+public:
+    /// What one track's mean height does to one piece when it goes up.
+    struct Growth {
+        uint32_t track, piece;
+        double grown;  ///< how much less is missing there
+        double pull, square;  ///< half the slope and half the curvature of squared distance
+    };
+    /// `growths`: sorted by track. `near`, `missing`: by piece. `stays`: by track, those that take no step.
+    Steps(const std::vector<Growth>& growths, std::vector<double> near, std::vector<double> missing, const std::vector<bool>& stays)
+        : tracks_(stays.size()), near_(std::move(near)), left_(std::move(missing)), off2_(left_.size()) {
+        for (size_t i = 0; i < tracks_.size(); ++i) tracks_[i].taken = stays[i];
+        for (const Growth& g : growths) {
+            Track& track = tracks_[g.track];
+            if (track.first == track.last) track.first = track.last = entries_.size();
+            entries_.push_back({g.piece, g.grown}), ++track.last;
+            track.pull += g.pull, track.square += g.square;
+            near_[g.piece] = std::max(near_[g.piece], nearest * std::fabs(g.grown));
         }
-    return best;
-}
+        for (uint32_t piece = 0; piece < left_.size(); ++piece) set_left(piece, left_[piece]);
+    }
+    bool any_off() const { return off_ > 0; }
+    /// The best that is left, and its way: the one that harms least of those that mend much. No way: none mends anything.
+    std::pair<size_t, int> best(int jobs) {
+        parallel_for((tracks_.size() + run - 1) / run, jobs, [&](size_t k) {
+            for (size_t i = k * run; i < std::min((k + 1) * run, tracks_.size()); ++i)
+                if (!tracks_[i].taken) find_gains(tracks_[i]);
+        });
+        double most = 0;
+        for (const Track& track : tracks_)
+            if (!track.taken) most = std::max({most, track.gain[0], track.gain[1]});
+        std::pair<size_t, int> best{0, 0};
+        double least = INFINITY;
+        for (size_t i = 0; i < tracks_.size() && most > 0; ++i)
+            for (const int way : {-1, 1}) {
+                const Track& track = tracks_[i];
+                const double mended = track.gain[way > 0], harm = track.harm(way) / mended;
+                if (!track.taken && mended >= enough * most && harm < least) least = harm, best = {i, way};
+            }
+        return best;
+    }
+    void take(size_t track, int way) {
+        tracks_[track].taken = true;
+        for (size_t k = tracks_[track].first; k < tracks_[track].last; ++k) set_left(entries_[k].piece, left_[entries_[k].piece] - way * entries_[k].grown);
+    }
+
+private:
+    static constexpr size_t run = 256;  ///< tracks that are a task
+    struct Entry {
+        uint32_t piece;
+        double grown;
+    };
+    struct Track {
+        size_t first = 0, last = 0;  ///< its entries
+        double pull = 0, square = 0, gain[2] = {};
+        bool taken = false;
+        double harm(int way) const { return std::max(square + 2 * way * pull, least_harm * square); }
+    };
+    double beyond2(uint32_t piece, double left) const {
+        const double beyond = std::max(std::fabs(left) - near_[piece], 0.0);
+        return beyond * beyond;
+    }
+    /// What a step takes away from Σ beyond², either way.
+    void find_gains(Track& track) const {
+        double down = 0, up = 0;
+        for (size_t k = track.first; k < track.last; ++k) {
+            const auto [piece, grown] = entries_[k];
+            down += off2_[piece] - beyond2(piece, left_[piece] + grown), up += off2_[piece] - beyond2(piece, left_[piece] - grown);
+        }
+        track.gain[0] = down, track.gain[1] = up;
+    }
+    void set_left(uint32_t piece, double left) {
+        off_ -= off2_[piece] > 0;
+        left_[piece] = left, off2_[piece] = beyond2(piece, left);
+        off_ += off2_[piece] > 0;
+    }
+
+    std::vector<Track> tracks_;
+    std::vector<Entry> entries_;
+    std::vector<double> near_, left_, off2_;  ///< by piece: may be missing, is, and beyond² of that
+    size_t off_ = 0;                          ///< pieces
+};
 
 /// Takes steps in rounds, and back those that did not do what they should: a strand has torn, or run into another.
 class VolumeRefit {
@@ -197,37 +245,32 @@ private:
             }
     }
     void take_steps() {
-        std::vector<Piece*> pieces;
-        std::vector<Step> steps = find_steps(pieces);
-        while (std::any_of(pieces.begin(), pieces.end(), [](const Piece* piece) { return piece->is_off(); })) {
-            const auto [id, way] = best_step(steps);
+        Steps steps = find_steps();
+        while (steps.any_off()) {
+            const auto [id, way] = steps.best(goal_.jobs);
             if (way == 0) return;
-            steps[id].taken = true, moved_[id] = way;
-            for (const auto& [piece, grown] : steps[id].grown) piece->left -= way * grown;
+            steps.take(id, way), moved_[id] = way;
             step(id, way);
         }
     }
-    std::vector<Step> find_steps(std::vector<Piece*>& pieces) {
-        std::vector<Step> steps(coded_.tracks.size());
-        for (size_t i = 0; i < steps.size(); ++i) steps[i].taken = stays_[i];
+    Steps find_steps() const {
+        std::vector<Steps::Growth> growths;
+        std::vector<double> near, missing;
         for (size_t s = 0; s < of_sample_.size(); ++s)
-            for (auto& [name, piece] : of_sample_[s]) {
+            for (const auto& [name, piece] : of_sample_[s]) {
                 if (!(std::fabs(piece.missing) < most_missing)) continue;
-                piece.left = piece.missing;
-                pieces.push_back(&piece);
-                for (const Member& member : piece.members) add(steps[member.track], piece, member, s);
+                for (const Member& member : piece.members) growths.push_back(growth_of(piece, uint32_t(near.size()), member, s));
+                near.push_back(piece.near), missing.push_back(piece.missing);
             }
-        for (const Step& step : steps)
-            for (const auto& [piece, grown] : step.grown) piece->near = std::max(piece->near, nearest * std::fabs(grown));
-        return steps;
+        std::stable_sort(growths.begin(), growths.end(), [](const Steps::Growth& a, const Steps::Growth& b) { return a.track < b.track; });
+        return {growths, std::move(near), std::move(missing), stays_};
     }
-    void add(Step& step, Piece& piece, const Member& member, size_t sample) const {
+    Steps::Growth growth_of(const Piece& piece, uint32_t number, const Member& member, size_t sample) const {
         const TrackSamples& track = coded_.decoded[member.track];
         const uint32_t life = uint32_t(track.position.size());
         const glm::dvec3 axis = axes_of(coded_.tracks[member.track].axis, format::axis_levels(lattice_, life)).n;
         const double up = mean_step(lattice_, life) * glm::dot(axis, glm::dvec3(track.normal[sample - track.birth]));
-        step.grown.emplace_back(&piece, up * member.area / piece.volume);
-        step.pull -= up * member.area * member.above, step.square += up * up * member.area;
+        return {member.track, number, up * member.area / piece.volume, -up * member.area * member.above, up * up * member.area};
     }
     /// Those that have pieces, in the lives of what has moved.
     std::vector<size_t> samples_moved() const {

@@ -116,6 +116,23 @@ void divide(const float* const position[3], uint32_t* points, uint32_t count, ui
     std::sort(points, points + count);
 }
 
+/// Point `at`, from its source.
+void place_point(Field& f, uint32_t at, const format::PointSet& p) {
+    const uint32_t i = f.source[at];
+    const float length = std::sqrt(p.nx[i] * p.nx[i] + p.ny[i] * p.ny[i] + p.nz[i] * p.nz[i]);
+    const float scale = length > 0 ? 1 / length : 0;
+    f.x[at] = p.x[i], f.y[at] = p.y[i], f.z[at] = p.z[i];
+    f.nx[at] = p.nx[i] * scale, f.ny[at] = p.ny[i] * scale, f.nz[at] = p.nz[i] * scale;
+    f.vx[at] = p.vx[i], f.vy[at] = p.vy[i], f.vz[at] = p.vz[i];
+    f.activity[at] = std::min(p.activity[i], 1.f);
+}
+void pad_points(Field& f) {
+    for (uint32_t at = f.point_count; at < f.point_count + lanes; ++at) {
+        f.x[at] = f.y[at] = f.z[at] = nowhere;
+        f.nx[at] = f.ny[at] = f.nz[at] = f.activity[at] = f.area[at] = 0, f.steep[at] = 1;
+    }
+}
+
 void sort_points(Field& f, const format::PointSet& p) {
     for (uint32_t i = 0; i < p.count; ++i)
         if (finite(p, i)) f.source[f.point_count++] = i;
@@ -124,19 +141,8 @@ void sort_points(Field& f, const format::PointSet& p) {
     f.spacing = spacing_of(e.lower, e.upper, f.point_count);
     static_assert(sizeof(Patch) >= 4 * sizeof(uint32_t));
     divide(position, f.source, f.point_count, reinterpret_cast<uint32_t*>(f.patches));  // not placed yet
-    for (uint32_t at = 0; at < f.point_count; ++at) {
-        const uint32_t i = f.source[at];
-        const float length = std::sqrt(p.nx[i] * p.nx[i] + p.ny[i] * p.ny[i] + p.nz[i] * p.nz[i]);
-        const float scale = length > 0 ? 1 / length : 0;
-        f.x[at] = p.x[i], f.y[at] = p.y[i], f.z[at] = p.z[i];
-        f.nx[at] = p.nx[i] * scale, f.ny[at] = p.ny[i] * scale, f.nz[at] = p.nz[i] * scale;
-        f.vx[at] = p.vx[i], f.vy[at] = p.vy[i], f.vz[at] = p.vz[i];
-        f.activity[at] = std::min(p.activity[i], 1.f);
-    }
-    for (uint32_t at = f.point_count; at < f.point_count + lanes; ++at) {
-        f.x[at] = f.y[at] = f.z[at] = nowhere;
-        f.nx[at] = f.ny[at] = f.nz[at] = f.activity[at] = f.area[at] = 0, f.steep[at] = 1;
-    }
+    for (uint32_t at = 0; at < f.point_count; ++at) place_point(f, at, p);
+    pad_points(f);
 }
 
 /// Of bundle k, from those of what it holds; `part(i, a, low, high)` tells their extent along axis a.
@@ -292,6 +298,13 @@ void begin_field(Field& field, void* memory, const format::PointSet& points, con
     bound_drops(field);
 }
 
+void resize_field(Field& f, uint32_t count, const format::PointSet& more) noexcept {
+    for (uint32_t at = f.point_count; at < count; ++at) f.source[at] = at - f.point_count, place_point(f, at, more);
+    f.point_count = count;
+    pad_points(f);
+    begin_bundles(f);
+}
+
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
     Nearest nearest;
     for (uint32_t bundle = first / lanes; bundle * lanes < last; ++bundle) {
@@ -303,6 +316,7 @@ void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept {
 void finish_field(Field& f) noexcept {
     join_discs(f);
     widen_bundles(f);
+    f.largest_support = 0;
     for (uint32_t i = 0; i < f.point_count; ++i) f.largest_support = std::max(f.largest_support, f.support[i]);
 }
 

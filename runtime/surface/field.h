@@ -77,6 +77,9 @@ void begin_field(Field& field, void* memory, const format::PointSet& points, con
 void fit_patches(Field& field, uint32_t first, uint32_t last) noexcept;
 /// Step 3, one thread: bundles, largest support.
 void finish_field(Field& field) noexcept;
+/// Before step 2, one thread: makes the field's points `count` again or more; `more` are what comes beyond those it has, at the end of
+/// its order, so that all there are keep their numbers. The field must have room: that of points of begin_field() that had no activity.
+void resize_field(Field& field, uint32_t count, const format::PointSet& more) noexcept;
 
 /// After drops have been moved or their reach changed, one thread: gather() finds them by this. begin_field() does it too.
 void bound_drops(const Field& field) noexcept;
