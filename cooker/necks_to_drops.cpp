@@ -75,7 +75,7 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
     };
     const uint32_t piece = piece_at(neck.middle);
     if (piece_at(from) != piece || piece_at(to) != piece) return {};
-    const NeckCorners corners(neck, edge, around_neck * edge, decoded);
+    const NeckCorners corners(neck, frame, around_neck * edge, decoded);
     const std::vector<float> torn = field.values_at(corners.x, corners.y, corners.z);
     for (const float radius : radii) {
         Spindle spindle{0.5f * (from + to), gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1), std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge};
@@ -84,7 +84,7 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
         spindle.draw(edge, coded_off * edge);
         std::vector<float> held = torn;
         for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], spindle.value({corners.x[i], corners.y[i], corners.z[i]}));
-        if (!corners.is_torn(held, torn)) return drop;
+        if (!corners.is_amiss(held, torn)) return drop;
     }
     return {};
 }
@@ -101,6 +101,7 @@ std::vector<Drop> neck_drops(const SurfaceFrame& frame, const std::vector<Surfac
     std::vector<std::array<uint32_t, 2>> held;
     std::vector<VertexTree::Found> found;
     for (const TornNeck& neck : find_torn_necks(frame, decoded)) {
+        if (neck.of != TornNeck::Of::liquid) continue;  // a bubble as thin would hardly hold a corner
         if (std::find(held.begin(), held.end(), neck.pieces) != held.end()) continue;
         std::optional<Drop> drop = hold(frame, label, neck, decoded, field);
         if (!drop) continue;

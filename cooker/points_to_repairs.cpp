@@ -34,7 +34,7 @@ constexpr float cleared = 0.8f;           // places begin no nearer to an earlie
 // whatever the source's is.
 constexpr float neck_spacing = 0.125f, neck_depth = 0.1f;
 constexpr double least_neck_gain = 0.2;
-constexpr float neck_thicker = 0.15f;
+constexpr float neck_thicker = 0.15f;          // of liquid, or of the air that is to be there
 constexpr double torn_counts = 2;            // as so much of confusion()
 
 // A trial's time is that of its points: without this limit cooks of violent liquid take 12 to 26 % more of it, for the same figures.
@@ -93,6 +93,7 @@ struct Place {
     glm::vec3 centre;
     float radius;
     std::optional<NeckCorners> neck;
+    bool is_liquid = true;        ///< the neck is, and is torn
     std::vector<float> torn;      ///< values at the neck's corners as it was found
     std::vector<float> x, y, z, depth;
     std::vector<SurfacePoint> candidates;
@@ -122,7 +123,7 @@ void find_candidates(const SurfaceFrame& frame, Place& place) {
             return glm::distance(p.position, q.position) < candidates_apart * place.radius && glm::dot(p.normal, q.normal) > same_side;
         });
         if (taken || !settle(frame, point_radius * frame.edge, p)) continue;
-        if (place.neck) p.position += neck_thicker * frame.edge * p.normal;
+        if (place.neck) p.position += (place.is_liquid ? neck_thicker : -neck_thicker) * frame.edge * p.normal;
         place.candidates.push_back(p);
         if (place.candidates.size() == most_candidates) return;
     }
@@ -161,7 +162,7 @@ double confusion(const SurfaceFrame& frame, const Place& place, const PointField
     double sum = 0, torn = 0;
     for (size_t i = 0; i < value.size(); ++i)
         if ((value[i] < 0) != (place.depth[i] > 0)) sum += std::fabs(place.depth[i]) / frame.edge;
-    if (place.neck && place.neck->is_torn(decoded.values_at(place.neck->x, place.neck->y, place.neck->z), place.torn)) torn = torn_counts;
+    if (place.neck && place.neck->is_amiss(decoded.values_at(place.neck->x, place.neck->y, place.neck->z), place.torn)) torn = torn_counts;
     const double apart = place.neck ? neck_spacing / probe_spacing : 1;
     return torn + sum * std::pow(apart * place.radius / (least_radius * frame.edge), 3);
 }
@@ -258,11 +259,14 @@ std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const st
     if (points.empty() || frame.mesh.triangles.empty()) return {};
     const DecodedPieces pieces(decoded, jobs);
     std::vector<Place> places;
-    for (const TornNeck& neck : find_torn_necks(frame, pieces)) {
-        Place& place = places.emplace_back();
-        place.centre = neck.middle, place.radius = least_radius * frame.edge;
-        place.neck.emplace(neck, frame.edge, place.radius, pieces);
-    }
+    const auto add_necks = [&](const std::vector<TornNeck>& necks) {
+        for (const TornNeck& neck : necks) {
+            Place& place = places.emplace_back();
+            place.centre = neck.middle, place.radius = least_radius * frame.edge, place.is_liquid = neck.of == TornNeck::Of::liquid;
+            place.neck.emplace(neck, frame, place.radius, pieces);
+        }
+    };
+    add_necks(find_torn_necks(frame, pieces)), add_necks(find_false_necks(frame, pieces));
     for (const OffSurface& off : find_off(frame, decoded, pieces.index, beyond, jobs)) {
         const auto near = [&](const Place& p) { return !p.neck && glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(places.begin(), places.end(), near)) continue;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where liquid that hangs together in the source comes apart as decoded.
+// Where liquid, or the air in it, that hangs together in the source comes apart as decoded, or pieces of liquid that are apart run
+// into each other.
 #pragma once
 #include <array>
 #include <cmath>
@@ -20,26 +21,38 @@ struct DecodedPieces {
 };
 
 struct TornNeck {
+    enum class Of : uint8_t {
+        liquid,  ///< it joins two decoded pieces
+        air,     ///< of a cavity that is decoded as a bubble: likewise
+        none     ///< decoded, but not the source's: it joins two of the source's pieces
+    };
     glm::vec3 middle;                ///< metres
-    std::array<uint32_t, 2> pieces;  ///< that it joins in the source: labels
+    std::array<uint32_t, 2> pieces;  ///< labels: of decoded pieces, or of the source's
+    Of of;
 };
 /// The source's necks that join what is decoded as two pieces.
 std::vector<TornNeck> find_torn_necks(const SurfaceFrame& frame, const DecodedPieces& decoded);
+/// Decoded necks between pieces of the source's liquid that are apart.
+std::vector<TornNeck> find_false_necks(const SurfaceFrame& frame, const DecodedPieces& decoded);
 
-/// Corners of the runtime's cells round a neck: its two pieces are one where their liquid ones join, along edges of cells.
+/// Corners of the runtime's cells round a neck: its two pieces are one where their liquid ones join (of air: those in the air), along edges
+/// of cells.
 class NeckCorners {
 public:
     /// Those within `radius` of its middle, along every axis; metres.
-    NeckCorners(const TornNeck& neck, float cell, float radius, const DecodedPieces& decoded);
+    NeckCorners(const TornNeck& neck, const SurfaceFrame& frame, float radius, const DecodedPieces& decoded);
     std::vector<float> x, y, z;
-    /// `value`: of the field there, negative in the liquid; `before`: while the neck was torn. Where no corner of either piece was near,
-    /// nothing tells: false.
-    bool is_torn(const std::vector<float>& value, const std::vector<float>& before) const;
+    /// Whether the pieces are one that should be two, or two that should be one. `value`: of the field there, negative in the liquid;
+    /// `before`: as the neck was found. Where no corner of either piece was near, nothing tells: false.
+    bool is_amiss(const std::vector<float>& value, const std::vector<float>& before) const;
 
 private:
-    /// Of a piece, nearest to the neck, or none.
-    size_t liquid_corner(uint32_t piece, const std::vector<float>& value) const;
+    bool is_in(float value) const { return (value < 0) != (neck_.of == TornNeck::Of::air); }
+    /// In a piece: the nearest to the neck; or, of a false one, all that are not in the neck itself. `value`: as it was found.
+    std::vector<size_t> corners_of(uint32_t piece, const std::vector<float>& value) const;
+    bool are_joined(std::vector<size_t> from, const std::vector<size_t>& to, const std::vector<float>& value) const;
     TornNeck neck_;
+    float cell_;
     std::array<int, 3> size_;
     std::vector<uint32_t> piece_;
 };

@@ -157,29 +157,42 @@ TEST_CASE("thin liquid that no single point mends is mended by several at once")
 TEST_CASE("a neck that is torn is found where it is, and mended") {
     constexpr float edge = 0.05f, ball = 3, apart = 3.6f;
     float neck = 0;
+    bool air = false;
     SUBCASE("thick") { neck = 0.9f; }
     SUBCASE("thin") { neck = 0.5f; }
+    SUBCASE("of air") { neck = 0.9f, air = true; }
     CAPTURE(neck);
-    const SurfaceFrame frame(dumbbell(edge, ball, neck, apart), edge);
+    CAPTURE(air);
+    Mesh source = dumbbell(edge, ball, neck, apart);
     std::vector<SurfacePoint> points;
     for (const float side : {-1.f, 1.f})
         for (const SurfacePoint& p : points_of(16, ball * edge, {side * apart * edge, 0, 0})) points.push_back(p);
+    if (air) {  // a cavity in a ball
+        constexpr float around = 11 * edge;
+        for (Triangle& t : source.triangles) std::swap(t[0], t[1]);
+        for (glm::vec3& n : source.normals) n = -n;
+        for (SurfacePoint& p : points) p.normal = -p.normal;
+        append(source, sphere(40, around));
+        for (const SurfacePoint& p : points_of(24, around)) points.push_back(p);
+    }
+    const SurfaceFrame frame(std::move(source), edge);
     const Mesh torn = mesh_points(points, edge);
-    REQUIRE(topology(torn, edge).large_components == 2);
-    REQUIRE(topology(frame.mesh, edge).large_components == 1);
+    REQUIRE(topology(torn, edge).large_components == (air ? 3 : 2));
+    REQUIRE(topology(frame.mesh, edge).large_components == (air ? 2 : 1));
     const DecodedPieces pieces(torn, 1);
     const std::vector<TornNeck> necks = find_torn_necks(frame, pieces);
     REQUIRE(!necks.empty());
     for (const TornNeck& found : necks) {
         CHECK(glm::length(found.middle) < edge);
         CHECK(found.pieces[0] != found.pieces[1]);
+        CHECK(found.of == (air ? TornNeck::Of::air : TornNeck::Of::liquid));
     }
     // Farther off than any vertex is: only the neck can be the reason.
     const std::vector<Path> born = repaired(frame, 0, points, 5 * edge, 2);
     REQUIRE(!born.empty());
     for (const Path& path : born) points.push_back(path.target(0));
     const Mesh mended = mesh_points(points, edge);
-    CHECK(topology(mended, edge).large_components == 1);
+    CHECK(topology(mended, edge).large_components == (air ? 2 : 1));
     CHECK(find_torn_necks(frame, DecodedPieces(mended, 1)).empty());
 }
 
