@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the Mantaflow scenes beside this file share (Blender 3.4.1, headless)."""
 import json
+import math
 import os
 import sys
 import time
@@ -49,6 +50,29 @@ def cylinder(name, centre, radius, depth):
     return bpy.context.object
 
 
+def lathe(name, profile, segments=64):
+    """A profile of (radius, height), from the axis to the axis, turned about z."""
+    vertices, faces = [], []
+    for i in range(segments):
+        turn = 2 * math.pi * i / segments
+        vertices += [(radius * math.cos(turn), radius * math.sin(turn), height) for radius, height in profile]
+        here, beyond = i * len(profile), (i + 1) % segments * len(profile)
+        faces += [(here + j, here + j + 1, beyond + j + 1, beyond + j) for j in range(len(profile) - 1)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    ob = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(ob)
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = ob
+    ob.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.remove_doubles()  # the ends on the axis
+    bpy.ops.mesh.normals_make_consistent(inside=False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return ob
+
+
 def flow(ob, behavior="GEOMETRY", velocity=None):
     modifier = ob.modifiers.new("Fluid", "FLUID")
     modifier.fluid_type = "FLOW"
@@ -71,7 +95,7 @@ def obstacle(ob):
     settings.subframes = 0
 
 
-def domain(low, high, resolution, frames, cache, mesh_scale, particle_radius):
+def domain(low, high, resolution, frames, cache, mesh_scale=2, particle_radius=1.0, fractions=False, tension=0.0):
     ob = box("Domain", low, high)
     modifier = ob.modifiers.new("Fluid", "FLUID")
     modifier.fluid_type = "DOMAIN"
@@ -91,12 +115,12 @@ def domain(low, high, resolution, frames, cache, mesh_scale, particle_radius):
     d.mesh_scale = mesh_scale
     d.mesh_particle_radius = 2.0
     d.particle_radius = particle_radius
-    d.use_fractions = False
+    d.use_fractions = fractions
     d.use_adaptive_timesteps = True
     d.timesteps_max = 4
     d.timesteps_min = 1
     d.cfl_condition = 2.0
-    d.surface_tension = 0.0
+    d.surface_tension = tension
     d.use_collision_border_top = True
     bpy.context.view_layer.objects.active = ob
     return ob
