@@ -196,6 +196,34 @@ TEST_CASE("a neck that is torn is found where it is, and mended") {
     CHECK(find_torn_necks(frame, DecodedPieces(mended, 1)).empty());
 }
 
+TEST_CASE("a neck between pieces that are apart is found where it is") {
+    constexpr float edge = 0.05f, ball = 3, apart = 3.6f;
+    Mesh source = sphere(24, ball * edge, {-apart * edge, 0, 0});
+    append(source, sphere(24, ball * edge, {apart * edge, 0, 0}));
+    const SurfaceFrame frame(std::move(source), edge);
+    const Mesh joined = dumbbell(edge, ball, 0.9f, apart);
+    const DecodedPieces pieces(joined, 1);
+    const std::vector<TornNeck> necks = find_false_necks(frame, pieces);
+    REQUIRE(!necks.empty());
+    for (const TornNeck& found : necks) {
+        CHECK(glm::length(found.middle) < edge);
+        CHECK(found.of == TornNeck::Of::none);
+        // Liquid that goes through the neck is amiss; air that parts it is not.
+        const NeckCorners corners(found, frame, 2.5f * edge, pieces);
+        std::vector<float> through(corners.x.size()), parted(corners.x.size());
+        for (size_t i = 0; i < through.size(); ++i) {
+            const glm::vec3 x(corners.x[i], corners.y[i], corners.z[i]);
+            const float balls = glm::length(glm::vec3(std::fabs(x.x) - apart * edge, x.y, x.z)) - ball * edge;
+            const float strand = std::hypot(x.y, x.z) - 0.9f * edge;
+            through[i] = std::min(balls, strand), parted[i] = balls;
+        }
+        CHECK(corners.is_amiss(through, through));
+        CHECK(!corners.is_amiss(parted, through));
+    }
+    CHECK(find_false_necks(frame, DecodedPieces(frame.mesh, 1)).empty());
+    CHECK(find_false_necks(frame, DecodedPieces(Mesh{}, 1)).empty());
+}
+
 TEST_CASE("pieces that are the source's own are not torn") {
     constexpr float edge = 0.05f;
     Mesh mesh = sphere(64, 0.5f);
