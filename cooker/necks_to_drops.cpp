@@ -22,7 +22,7 @@ constexpr float apart = 0.8f;                       // from other liquid
 constexpr float around_neck = 3;                    // corners that are looked at
 
 /// The vertex of a decoded piece that is nearest to x.
-glm::vec3 nearest_of(const DecodedPieces& decoded, uint32_t piece, const glm::vec3& x) {
+glm::vec3 nearest_of(const MeshPieces& decoded, uint32_t piece, const glm::vec3& x) {
     glm::vec3 best(INFINITY);
     for (uint32_t v = 0; v < decoded.label.size(); ++v)
         if (decoded.label[v] == piece && glm::distance(decoded.mesh.positions[v], x) < glm::distance(best, x)) best = decoded.mesh.positions[v];
@@ -64,7 +64,7 @@ bool is_alone(const Spindle& spindle, uint32_t piece, const SurfaceFrame& frame,
 
 /// What holds the neck; nothing where none of the radii does. The thinnest where no corner of cells is near enough to tell.
 /// `label`: of the source's vertices.
-std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const TornNeck& neck, const DecodedPieces& decoded, const PointField& field) {
+std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const TornNeck& neck, const MeshPieces& decoded, const PointField& field) {
     const glm::vec3 from = nearest_of(decoded, neck.pieces[0], neck.middle), to = nearest_of(decoded, neck.pieces[1], neck.middle);
     const float gap = glm::distance(from, to), edge = frame.edge;
     if (!(gap < longest_gap * edge)) return {};
@@ -75,7 +75,7 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
     };
     const uint32_t piece = piece_at(neck.middle);
     if (piece_at(from) != piece || piece_at(to) != piece) return {};
-    const NeckCorners corners(neck, frame, around_neck * edge, decoded);
+    const NeckCorners corners(neck, edge, around_neck * edge, decoded);
     const std::vector<float> torn = field.values_at(corners.x, corners.y, corners.z);
     for (const float radius : radii) {
         Spindle spindle{0.5f * (from + to), gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1), std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge};
@@ -96,14 +96,14 @@ std::vector<Drop> neck_drops(const SurfaceFrame& frame, const std::vector<Surfac
     if (points.empty()) return drops;
     const PointField field(points);
     const Mesh mesh = mesh_points(points, frame.edge, 1, frame.mesh.positions.size());
-    const DecodedPieces decoded(mesh, 1);
-    const std::vector<uint32_t> label = label_components(frame.mesh);
+    const MeshPieces decoded(mesh, 1);
+    const MeshPieces source(frame);
     std::vector<std::array<uint32_t, 2>> held;
     std::vector<VertexTree::Found> found;
-    for (const TornNeck& neck : find_torn_necks(frame, decoded)) {
+    for (const TornNeck& neck : find_torn_necks(source, decoded, frame.edge)) {
         if (neck.of != TornNeck::Of::liquid) continue;  // a bubble as thin would hardly hold a corner
         if (std::find(held.begin(), held.end(), neck.pieces) != held.end()) continue;
-        std::optional<Drop> drop = hold(frame, label, neck, decoded, field);
+        std::optional<Drop> drop = hold(frame, source.label, neck, decoded, field);
         if (!drop) continue;
         frame.tree.nearest(neck.middle, 1, found);
         if (!frame.mesh.velocities.empty()) drop->velocity = frame.mesh.velocities[found[0].vertex];

@@ -257,16 +257,16 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
 std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
                                  float beyond, int jobs) {
     if (points.empty() || frame.mesh.triangles.empty()) return {};
-    const DecodedPieces pieces(decoded, jobs);
+    const MeshPieces source(frame), pieces(decoded, jobs);
     std::vector<Place> places;
-    const auto add_necks = [&](const std::vector<TornNeck>& necks) {
+    const auto add_necks = [&](const std::vector<TornNeck>& necks, const MeshPieces& of) {
         for (const TornNeck& neck : necks) {
             Place& place = places.emplace_back();
             place.centre = neck.middle, place.radius = least_radius * frame.edge, place.is_liquid = neck.of == TornNeck::Of::liquid;
-            place.neck.emplace(neck, frame, place.radius, pieces);
+            place.neck.emplace(neck, frame.edge, place.radius, of);
         }
     };
-    add_necks(find_torn_necks(frame, pieces)), add_necks(find_false_necks(frame, pieces));
+    add_necks(find_torn_necks(source, pieces, frame.edge), pieces), add_necks(find_false_necks(source, pieces, frame.edge), source);
     for (const OffSurface& off : find_off(frame, decoded, pieces.index, beyond, jobs)) {
         const auto near = [&](const Place& p) { return !p.neck && glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(places.begin(), places.end(), near)) continue;

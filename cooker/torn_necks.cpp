@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 namespace rill::cooker {
@@ -28,31 +29,21 @@ std::map<uint32_t, std::vector<uint32_t>> pieces_of(const std::vector<uint32_t>&
     return pieces;
 }
 
-/// The source's piece that most of the vertices lie nearest to.
-uint32_t home_of(const SurfaceFrame& frame, const std::vector<uint32_t>& source_label, const Mesh& decoded, const std::vector<uint32_t>& vertices) {
-    std::map<uint32_t, size_t> votes;
-    for (uint32_t v : vertices) {
-        const SurfaceIndex::Hit hit = frame.index.closest(decoded.positions[v], INFINITY);
-        ++votes[source_label[frame.mesh.triangles[hit.triangle][0]]];
-    }
-    const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
-    return std::max_element(votes.begin(), votes.end(), fewer)->first;
-}
-
 glm::vec3 middle_of(const Mesh& mesh, const Triangle& t) { return (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3.f; }
-
-/// What the source's vertex nearest to x belongs to.
-uint32_t nearest_label(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const glm::vec3& x) {
-    thread_local std::vector<VertexTree::Found> found;
-    frame.tree.nearest(x, 1, found);
-    return label[found[0].vertex];
-}
 
 struct Bounds {
     glm::vec3 lower{INFINITY}, upper{-INFINITY};
     void add(const glm::vec3& x, float around) { lower = glm::min(lower, x - around), upper = glm::max(upper, x + around); }
     bool holds(const glm::vec3& x) const { return glm::all(glm::lessThan(lower, x)) && glm::all(glm::lessThan(x, upper)); }
 };
+
+/// The piece of `other` that most of the vertices lie nearest to.
+uint32_t home_of(const MeshPieces& own, const std::vector<uint32_t>& vertices, const MeshPieces& other) {
+    std::map<uint32_t, size_t> votes;
+    for (uint32_t v : vertices) ++votes[other.nearest(own.mesh.positions[v])];
+    const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
+    return std::max_element(votes.begin(), votes.end(), fewer)->first;
+}
 
 /// Groups of places between the same pieces that lie together, as one at their middle each.
 void add_groups(const std::vector<TornNeck>& places, float width, std::vector<TornNeck>& groups) {
@@ -69,83 +60,68 @@ void add_groups(const std::vector<TornNeck>& places, float width, std::vector<To
     }
 }
 
+/// Pieces of `own` that lie on much larger ones of `other`: where triangles of these go from vertices nearest to the piece to others, as
+/// necks between pieces of `own`. `of(volume of the piece, of what it lies on)`: what kind of neck; nothing: none.
+template <typename Of>
+std::vector<TornNeck> find_necks(const MeshPieces& own, const MeshPieces& other, float edge, Of of) {
+    std::vector<TornNeck> necks;
+    if (own.mesh.triangles.empty() || other.mesh.triangles.empty()) return necks;
+    const std::vector<double> volume = label_volumes(own.mesh, own.label), other_volume = label_volumes(other.mesh, other.label);
+    for (const auto& [piece, vertices] : pieces_of(own.label, volume, least_piece * std::pow(double(edge), 3))) {
+        const uint32_t home = home_of(own, vertices, other);
+        if (std::fabs(other_volume[home]) < much_larger * std::fabs(volume[piece])) continue;
+        const std::optional<TornNeck::Of> kind = of(volume[piece], other_volume[home]);
+        if (!kind) continue;
+        Bounds bounds;
+        for (uint32_t v : vertices) bounds.add(own.mesh.positions[v], around_piece * edge);
+        std::vector<TornNeck> places;
+        for (const Triangle& t : other.mesh.triangles) {
+            if (other.label[t[0]] != home || !bounds.holds(other.mesh.positions[t[0]])) continue;
+            uint32_t beyond = piece, here = 0;
+            for (uint32_t v : t) {
+                const uint32_t nearest = own.nearest(other.mesh.positions[v]);
+                if (nearest == piece) ++here;
+                else beyond = nearest;
+            }
+            const bool joins = here > 0 && beyond != piece && (*kind != TornNeck::Of::none || volume[beyond] > 0);
+            if (joins) places.push_back({middle_of(other.mesh, t), {piece, beyond}, *kind});
+        }
+        add_groups(places, neck_width * edge, necks);
+    }
+    return necks;
+}
+
 }  // namespace
 
-DecodedPieces::DecodedPieces(const Mesh& decoded, int jobs) : mesh(decoded), index(decoded, jobs), label(label_components(decoded)) {}
+MeshPieces::MeshPieces(const Mesh& decoded, int jobs) : own_(std::make_unique<SurfaceIndex>(decoded, jobs)), mesh(decoded), index(*own_), label(label_components(decoded)) {}
+MeshPieces::MeshPieces(const SurfaceFrame& frame) : mesh(frame.mesh), index(frame.index), label(label_components(frame.mesh)) {}
 
-std::vector<TornNeck> find_torn_necks(const SurfaceFrame& frame, const DecodedPieces& decoded) {
-    std::vector<TornNeck> necks;
-    const Mesh& source = frame.mesh;
-    if (source.triangles.empty() || decoded.mesh.triangles.empty()) return necks;
-    const std::vector<uint32_t> source_label = label_components(source);
-    const std::vector<double> volume = label_volumes(decoded.mesh, decoded.label), source_volume = label_volumes(source, source_label);
-    for (const auto& [piece, vertices] : pieces_of(decoded.label, volume, least_piece * std::pow(double(frame.edge), 3))) {
-        const uint32_t home = home_of(frame, source_label, decoded.mesh, vertices);
-        const bool air = volume[piece] < 0;
-        if (std::fabs(source_volume[home]) < much_larger * std::fabs(volume[piece]) || (!air && source_volume[home] < 0)) continue;
-        Bounds bounds;
-        for (uint32_t v : vertices) bounds.add(decoded.mesh.positions[v], around_piece * frame.edge);
-        std::vector<TornNeck> torn;
-        for (const Triangle& t : source.triangles) {
-            if (source_label[t[0]] != home || !bounds.holds(source.positions[t[0]])) continue;
-            uint32_t other = piece, own = 0;
-            for (uint32_t v : t) {
-                const uint32_t nearest = decoded.nearest(source.positions[v]);
-                if (nearest == piece) ++own;
-                else other = nearest;
-            }
-            if (own > 0 && other != piece)
-                torn.push_back({middle_of(source, t), {piece, other}, air ? TornNeck::Of::air : TornNeck::Of::liquid});
-        }
-        add_groups(torn, neck_width * frame.edge, necks);
-    }
-    return necks;
+std::vector<TornNeck> find_torn_necks(const MeshPieces& source, const MeshPieces& decoded, float edge) {
+    return find_necks(decoded, source, edge, [](double volume, double home) -> std::optional<TornNeck::Of> {
+        if (volume < 0) return TornNeck::Of::air;
+        if (home < 0) return {};  // a drop in a bubble
+        return TornNeck::Of::liquid;
+    });
 }
 
-std::vector<TornNeck> find_false_necks(const SurfaceFrame& frame, const DecodedPieces& decoded) {
-    std::vector<TornNeck> necks;
-    const Mesh& source = frame.mesh;
-    if (source.triangles.empty() || decoded.mesh.triangles.empty()) return necks;
-    const std::vector<uint32_t> label = label_components(source);
-    const std::vector<double> volume = label_volumes(source, label), decoded_volume = label_volumes(decoded.mesh, decoded.label);
-    for (const auto& [piece, vertices] : pieces_of(label, volume, least_piece * std::pow(double(frame.edge), 3))) {
-        if (volume[piece] < 0) continue;
-        std::map<uint32_t, size_t> votes;
-        for (uint32_t v : vertices) ++votes[decoded.nearest(source.positions[v])];
-        const uint32_t home = std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) { return a.second < b.second; })->first;
-        if (decoded_volume[home] < much_larger * volume[piece]) continue;
-        Bounds bounds;
-        for (uint32_t v : vertices) bounds.add(source.positions[v], around_piece * frame.edge);
-        std::vector<TornNeck> joined;
-        for (const Triangle& t : decoded.mesh.triangles) {
-            if (decoded.label[t[0]] != home || !bounds.holds(decoded.mesh.positions[t[0]])) continue;
-            uint32_t other = piece, own = 0;
-            for (uint32_t v : t) {
-                const uint32_t nearest = nearest_label(frame, label, decoded.mesh.positions[v]);
-                if (nearest == piece) ++own;
-                else other = nearest;
-            }
-            if (own > 0 && other != piece && volume[other] > 0) joined.push_back({middle_of(decoded.mesh, t), {piece, other}, TornNeck::Of::none});
-        }
-        add_groups(joined, neck_width * frame.edge, necks);
-    }
-    return necks;
+std::vector<TornNeck> find_false_necks(const MeshPieces& source, const MeshPieces& decoded, float edge) {
+    return find_necks(source, decoded, edge, [](double volume, double home) -> std::optional<TornNeck::Of> {
+        if (volume < 0 || home < 0) return {};
+        return TornNeck::Of::none;
+    });
 }
 
-NeckCorners::NeckCorners(const TornNeck& neck, const SurfaceFrame& frame, float radius, const DecodedPieces& decoded) : neck_(neck), cell_(frame.edge) {
+NeckCorners::NeckCorners(const TornNeck& neck, float cell, float radius, const MeshPieces& pieces) : neck_(neck), cell_(cell) {
     std::array<int, 3> first;
     for (int a = 0; a < 3; ++a) {
         first[size_t(a)] = int(std::ceil((neck.middle[a] - radius) / cell_));
         size_[size_t(a)] = int(std::floor((neck.middle[a] + radius) / cell_)) - first[size_t(a)] + 1;
     }
-    std::vector<uint32_t> label;
-    if (neck.of == TornNeck::Of::none) label = label_components(frame.mesh);
     for (int k = 0; k < size_[2]; ++k)
         for (int j = 0; j < size_[1]; ++j)
             for (int i = 0; i < size_[0]; ++i) {
                 x.push_back(cell_ * float(first[0] + i)), y.push_back(cell_ * float(first[1] + j)), z.push_back(cell_ * float(first[2] + k));
-                const glm::vec3 at(x.back(), y.back(), z.back());
-                piece_.push_back(label.empty() ? decoded.nearest(at) : nearest_label(frame, label, at));
+                piece_.push_back(pieces.nearest({x.back(), y.back(), z.back()}));
             }
 }
 

@@ -4,17 +4,22 @@
 #pragma once
 #include <array>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "surface_frame.h"
 
 namespace rill::cooker {
 
-/// Pieces of a decoded mesh, and what tells them apart. Keeps a reference.
-struct DecodedPieces {
-    DecodedPieces(const Mesh& decoded, int jobs);
+/// Pieces of a mesh, and what tells them apart. Keeps a reference.
+class MeshPieces {
+    std::unique_ptr<SurfaceIndex> own_;  ///< a frame has one
+
+public:
+    MeshPieces(const Mesh& decoded, int jobs);
+    explicit MeshPieces(const SurfaceFrame& frame);
     const Mesh& mesh;
-    SurfaceIndex index;
+    const SurfaceIndex& index;
     std::vector<uint32_t> label;  ///< of the vertices, by label_components()
     /// The piece that x is nearest to, by its label.
     uint32_t nearest(const glm::vec3& x) const { return label[mesh.triangles[index.closest(x, INFINITY).triangle][0]]; }
@@ -30,17 +35,17 @@ struct TornNeck {
     std::array<uint32_t, 2> pieces;  ///< labels: of decoded pieces, or of the source's
     Of of;
 };
-/// The source's necks that join what is decoded as two pieces.
-std::vector<TornNeck> find_torn_necks(const SurfaceFrame& frame, const DecodedPieces& decoded);
+/// The source's necks that join what is decoded as two pieces. `edge`: metres.
+std::vector<TornNeck> find_torn_necks(const MeshPieces& source, const MeshPieces& decoded, float edge);
 /// Decoded necks between pieces of the source's liquid that are apart.
-std::vector<TornNeck> find_false_necks(const SurfaceFrame& frame, const DecodedPieces& decoded);
+std::vector<TornNeck> find_false_necks(const MeshPieces& source, const MeshPieces& decoded, float edge);
 
 /// Corners of the runtime's cells round a neck: its two pieces are one where their liquid ones join (of air: those in the air), along edges
 /// of cells.
 class NeckCorners {
 public:
-    /// Those within `radius` of its middle, along every axis; metres.
-    NeckCorners(const TornNeck& neck, const SurfaceFrame& frame, float radius, const DecodedPieces& decoded);
+    /// Those within `radius` of its middle, along every axis; metres. `pieces`: those that the neck tells of.
+    NeckCorners(const TornNeck& neck, float cell, float radius, const MeshPieces& pieces);
     std::vector<float> x, y, z;
     /// Whether the pieces are one that should be two, or two that should be one. `value`: of the field there, negative in the liquid;
     /// `before`: as the neck was found. Where no corner of either piece was near, nothing tells: false.

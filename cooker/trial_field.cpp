@@ -67,7 +67,7 @@ void TrialField::take_back() {
 }
 
 void TrialFields::keep(const std::vector<SurfacePoint>& added) {
-    points_.insert(points_.end(), added.begin(), added.end()), kept_.insert(kept_.end(), added.begin(), added.end());
+    kept_.insert(kept_.end(), added.begin(), added.end());
     for (const auto& field : fields_) field->add(added);
 }
 
@@ -80,7 +80,7 @@ std::unique_ptr<TrialField> TrialFields::take() {
             return field;
         }
     }
-    auto field = std::make_unique<TrialField>(std::vector<SurfacePoint>(points_.begin(), points_.end() - ptrdiff_t(kept_.size())), room_);
+    auto field = std::make_unique<TrialField>(points_, room_);
     if (!kept_.empty()) field->add(kept_);
     return field;
 }

@@ -48,13 +48,13 @@ public:
     }
     /// From now on these belong to all fields. No thread may be at work.
     void keep(const std::vector<SurfacePoint>& added);
-    const std::vector<SurfacePoint>& points() const { return points_; }
 
 private:
     std::unique_ptr<TrialField> take();
     void give_back(std::unique_ptr<TrialField> field);
 
-    std::vector<SurfacePoint> points_, kept_;
+    const std::vector<SurfacePoint> points_;
+    std::vector<SurfacePoint> kept_;
     size_t room_;
     std::mutex free_;
     std::vector<std::unique_ptr<TrialField>> fields_;

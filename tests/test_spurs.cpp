@@ -179,8 +179,8 @@ TEST_CASE("a neck that is torn is found where it is, and mended") {
     const Mesh torn = mesh_points(points, edge);
     REQUIRE(topology(torn, edge).large_components == (air ? 3 : 2));
     REQUIRE(topology(frame.mesh, edge).large_components == (air ? 2 : 1));
-    const DecodedPieces pieces(torn, 1);
-    const std::vector<TornNeck> necks = find_torn_necks(frame, pieces);
+    const MeshPieces pieces(torn, 1);
+    const std::vector<TornNeck> necks = find_torn_necks(MeshPieces(frame), pieces, edge);
     REQUIRE(!necks.empty());
     for (const TornNeck& found : necks) {
         CHECK(glm::length(found.middle) < edge);
@@ -193,7 +193,7 @@ TEST_CASE("a neck that is torn is found where it is, and mended") {
     for (const Path& path : born) points.push_back(path.target(0));
     const Mesh mended = mesh_points(points, edge);
     CHECK(topology(mended, edge).large_components == (air ? 2 : 1));
-    CHECK(find_torn_necks(frame, DecodedPieces(mended, 1)).empty());
+    CHECK(find_torn_necks(MeshPieces(frame), MeshPieces(mended, 1), edge).empty());
 }
 
 TEST_CASE("a neck between pieces that are apart is found where it is") {
@@ -202,14 +202,15 @@ TEST_CASE("a neck between pieces that are apart is found where it is") {
     append(source, sphere(24, ball * edge, {apart * edge, 0, 0}));
     const SurfaceFrame frame(std::move(source), edge);
     const Mesh joined = dumbbell(edge, ball, 0.9f, apart);
-    const DecodedPieces pieces(joined, 1);
-    const std::vector<TornNeck> necks = find_false_necks(frame, pieces);
+    const MeshPieces pieces(joined, 1);
+    const MeshPieces source_pieces(frame);
+    const std::vector<TornNeck> necks = find_false_necks(source_pieces, pieces, edge);
     REQUIRE(!necks.empty());
     for (const TornNeck& found : necks) {
         CHECK(glm::length(found.middle) < edge);
         CHECK(found.of == TornNeck::Of::none);
         // Liquid that goes through the neck is amiss; air that parts it is not.
-        const NeckCorners corners(found, frame, 2.5f * edge, pieces);
+        const NeckCorners corners(found, edge, 2.5f * edge, source_pieces);
         std::vector<float> through(corners.x.size()), parted(corners.x.size());
         for (size_t i = 0; i < through.size(); ++i) {
             const glm::vec3 x(corners.x[i], corners.y[i], corners.z[i]);
@@ -220,8 +221,9 @@ TEST_CASE("a neck between pieces that are apart is found where it is") {
         CHECK(corners.is_amiss(through, through));
         CHECK(!corners.is_amiss(parted, through));
     }
-    CHECK(find_false_necks(frame, DecodedPieces(frame.mesh, 1)).empty());
-    CHECK(find_false_necks(frame, DecodedPieces(Mesh{}, 1)).empty());
+    const Mesh nothing;
+    CHECK(find_false_necks(source_pieces, source_pieces, edge).empty());
+    CHECK(find_false_necks(source_pieces, MeshPieces(nothing, 1), edge).empty());
 }
 
 TEST_CASE("pieces that are the source's own are not torn") {
@@ -234,6 +236,7 @@ TEST_CASE("pieces that are the source's own are not torn") {
     for (const SurfacePoint& p : points_of(10, 0.15f, {0.7f, 0, 0})) points.push_back(p);
     const Mesh decoded = mesh_points(points, edge);
     REQUIRE(topology(decoded, edge).large_components == 2);
-    CHECK(find_torn_necks(frame, DecodedPieces(decoded, 1)).empty());
-    CHECK(find_torn_necks(frame, DecodedPieces(Mesh{}, 1)).empty());
+    const Mesh nothing;
+    CHECK(find_torn_necks(MeshPieces(frame), MeshPieces(decoded, 1), edge).empty());
+    CHECK(find_torn_necks(MeshPieces(frame), MeshPieces(nothing, 1), edge).empty());
 }

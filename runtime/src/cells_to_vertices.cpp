@@ -70,7 +70,7 @@ CellPattern pattern_at(const Mesher& m, const Tile& tile, uint32_t cell) {
     return plain ? pattern_of(signs, 0) : turned_pattern(m, tile, cell);
 }
 
-/// Work(bits) of 4³ cells each: vertices next to each other share what they are evaluated from. Row by row, z y x.
+/// Work(cell), block by block of 4³: vertices next to each other share what they are evaluated from.
 template <typename Work>
 void for_surface_cells(const Tile& tile, Work work) {
     for (uint32_t half = 0; half < 16; ++half) {  // of a block
@@ -143,21 +143,16 @@ struct Placing {
     const NearWalls walls = walls_near(m, tile);
     uint32_t n = 0;  ///< in the batch
 
-    /// At a place in a cell, in cells from its lowest corner, which is `corner`.
-    void append(uint32_t cell, uint32_t patch, const float (&corner)[3], const float (&place)[3], uint32_t met) {
-        float* out[3] = {s.x + n, s.y + n, s.z + n};
-        for (uint32_t a = 0; a < 3; ++a) *out[a] = (corner[a] + std::clamp(place[a], cell_margin, 1 - cell_margin)) * tile.cell;
-        s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(patch), s.meets[n] = uint16_t(met), ++n;
-    }
-
-    /// At the mean of its crossings; without any, in the middle.
+    /// At the mean of its crossings, whose shares are `share`; without any, in the middle. `corner`: the cell's, in cells; `all`: its crossings.
     void append_patch(uint32_t cell, const CellPatches& patches, uint32_t patch, const EdgeSums& sums, const float* share, const float (&corner)[3], const CellCrossings& all) {
-        float place[3];
+        float* out[3] = {s.x + n, s.y + n, s.z + n};
         for (uint32_t a = 0; a < 3; ++a) {
             const float along = share[4 * a] + share[4 * a + 1] + share[4 * a + 2] + share[4 * a + 3];
-            place[a] = sums.count > 0 ? (along + sums.lower[a]) / sums.count : 0.5f;
+            const float place = sums.count > 0 ? (along + sums.lower[a]) / sums.count : 0.5f;
+            *out[a] = (corner[a] + std::clamp(place, cell_margin, 1 - cell_margin)) * tile.cell;
         }
-        append(cell, patch, corner, place, walls.sides ? walls_met(walls, patches, patch, all, corner) : meets_free);
+        s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(patch);
+        s.meets[n] = uint16_t(walls.sides ? walls_met(walls, patches, patch, all, corner) : meets_free), ++n;
     }
 
     void append_cell(uint32_t cell, CellPattern pattern) {
