@@ -197,12 +197,17 @@ Layers assign_layers(const Window& window, const std::vector<TrackSamples>& trac
              spent = cost_of(taken, cost))
             if (!take_more(spent == 0 ? 0.15f * least : std::min(least - spent, (growth - 1) * spent))) break;
         result.error[l] = measure_taken(window, tracks, taken, l >= drops_layer, jobs);
-        // A cell of this layer's: twice as wide as the next one's.
+        // A cell of this layer's: twice as wide as the next one's. A track more may open a gap beside it, for supports shrink: the best is kept.
         const float allowed = format::fine_enough * std::ldexp(window.frames[0]->edge, int(layers - 1 - l));
-        for (float spent; l > 0 && result.error[l].p99 > allowed && (spent = cost_of(taken, cost)) < most_share * all;) {
-            if (!take_more(std::clamp(std::sqrt(result.error[l].p99 / allowed) - 1, least_step, most_step) * spent)) break;
-            result.error[l] = measure_taken(window, tracks, taken, l >= drops_layer, jobs);
+        std::vector<bool> best = taken;
+        LayerError error = result.error[l];
+        for (float left; l > 0 && error.p99 > allowed && (left = most_share * all - cost_of(taken, cost)) > 0;) {
+            const float spent = most_share * all - left;
+            if (!take_more(std::min(std::clamp(std::sqrt(error.p99 / allowed) - 1, least_step, most_step) * spent, left))) break;
+            error = measure_taken(window, tracks, taken, l >= drops_layer, jobs);
+            if (error.p99 < result.error[l].p99) result.error[l] = error, best = taken;
         }
+        taken = best;
         for (size_t i = 0; i < taken.size(); ++i)
             if (taken[i] && result.layer[i] == layers - 1) result.layer[i] = l;
     }

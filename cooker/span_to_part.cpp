@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iterator>
 
+#include "error_search.h"
 #include "error_target.h"
 #include "frames_to_tracks.h"
 #include "parallel.h"
@@ -19,38 +20,23 @@ namespace rill::cooker {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int most_attempts = 3;
-constexpr double finer_by = 0.1;             // an error below its target by more is bytes nobody asked for, and worth another attempt
 constexpr uint32_t judged_frames = 24;  // per attempt and span, evenly spread
-constexpr double least_gain = 0.4;           // of the error's logarithm per that of the tolerance: crevices narrower than a
-                                             // cell stay, and points without end would not tell them
-constexpr double least_hopeless = 1.4;       // times the target: where less is missing, the last attempt may still meet it
 constexpr double most_miss = 0.3;            // edges, of such liquid from the surface: velocities that carry nothing have more
 constexpr double calm_tolerance = 1.1;       // of such liquid: at the same tolerance its error is a tenth below that of other liquid
                                              // (a third at 0.12e: drop_splash takes 6 % more bytes at equal p99)
 constexpr double most_stretch = 0.1;         // of liquid that points go with: drop_splash has .05 to .08, dam_break .16 to .2
 constexpr float longest_edge = 2.5f;         // times the median
 constexpr float through_walls = 0.2f;        // tolerances: how far liquid is cooked to go on beyond them (walls.h)
+// Radians. At fine errors smaller steps: normals .5 % nearer for .9 % more bytes at equal p99 (dam_break 40:51, 0.12e, .05), or none (pour_sphere).
+constexpr float most_normal_step = 0.058f, coarse_normals = 0.3f, normals_follow = 0.2f;  // from this tolerance on, edges; power of it
 constexpr double usual_tolerance = 0.3, coarsest_tolerance = 0.03;  // of a search for a rate: start, edges; limit, of the diagonal
-
-/// Of the error aimed at: what an attempt begins with. Walls are exact: the more of the surface lies in them, the farther off may
-/// the rest be for the same p99; but .4 at most, or liquid ends before its walls. The finer, the more of the error is not the points'.
-double first_tolerance(double edges, double wall_share) {
-    const double finer = std::max(0.25 / edges, 1.0);
-    return 1.2 * std::pow(edges / 0.25, edges < 0.25 ? 0.6 : 0.2) + 0.8 * std::pow(finer, 0.3) * std::min(wall_share, 0.4);
-}
-/// The next attempt's, in the last one's: from how the last two errors, in the one aimed at, went with their tolerances (0: none before).
-double next_tolerance(double edges, double ratio, double tolerance, double ratio_before, double tolerance_before) {
-    const double by = std::log(tolerance / tolerance_before), did = std::log(ratio / ratio_before), usual = edges < 0.2 ? 1.3 : 0.9;
-    const double power = ratio_before > 0 && by * did > 0 ? std::clamp(by / did, 0.7, 2.0) : usual;
-    return std::clamp(std::pow(1 / ratio, power), 0.3, 2.0);
-}
 
 WindowGoal goal_for(double tolerance, const Survey& facts, int jobs) {
     WindowGoal goal;
     const float t = float(tolerance);
     goal.tolerance = t;
-    goal.quantiser = {0.34f * t, 4.f, 0.058f, 0.2f * t, 0.058f};
+    const float normal_step = most_normal_step * std::min(std::pow(t / (coarse_normals * facts.edge), normals_follow), 1.f);
+    goal.quantiser = {0.34f * t, 4.f, normal_step, 0.2f * t, normal_step};
     goal.origin = facts.lower;
     goal.jobs = jobs;
     return goal;
@@ -150,24 +136,17 @@ void SpanCook::run(uint32_t span, const std::string& output, const std::function
 
 SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
     const ChosenFrames judged(reader_, judged_frames_of(span));
+    ErrorSearch search(aim_.p99 / survey_.edge, survey_.wall_share);
     SpanResult kept;
-    const double edges = aim_.p99 / survey_.edge;
-    bool best_met = false;
-    double tolerance = first_tolerance(edges, survey_.wall_share) * aim_.p99, best_miss = HUGE_VAL, ratio_before = 0, tolerance_before = 0;
-    for (int attempt = 1;; ++attempt) {
-        SpanResult result = cook(span, candidate, tolerance, [&](uint32_t frames) { if (attempt == 1) done(frames); });
+    while (const std::optional<double> tolerance = search.next()) {
+        const bool is_first = search.attempts() == 0;
+        SpanResult result = cook(span, candidate, *tolerance * aim_.p99, [&](uint32_t frames) { if (is_first) done(frames); });
         result.measured = verify(candidate, judged, settings_.jobs, {}, Scrutiny::glance).totals;
-        const double ratio = result.measured.p99() / aim_.p99, miss = result.measured.area == 0 ? 0 : std::abs(std::log(ratio));
-        const bool met = ratio <= 1 + met_within, near = miss == 0 || (met && ratio >= 1 - finer_by);
-        // One that misses the target is no better than one that is too fine, however near it comes.
-        if (attempt == 1 || (met == best_met ? miss < best_miss : met)) best_miss = miss, best_met = met, kept = std::move(result), move_file(candidate, best);
-        kept.attempts = attempt;
-        if (near || attempt == most_attempts) return kept;
-        if (attempt > 1 && ratio > least_hopeless && tolerance < tolerance_before &&
-            std::log(ratio_before / ratio) < least_gain * std::log(tolerance_before / tolerance)) return kept;
-        const double next = tolerance * next_tolerance(edges, ratio, tolerance, ratio_before, tolerance_before);
-        ratio_before = ratio, tolerance_before = tolerance, tolerance = next;
+        const double ratio = result.measured.area == 0 ? 1 : result.measured.p99() / aim_.p99;
+        if (search.add(*tolerance, ratio, double(fs::file_size(candidate)))) kept = std::move(result), move_file(candidate, best);
     }
+    kept.attempts = search.attempts();
+    return kept;
 }
 SpanResult SpanCook::within_rate(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
     const std::vector<double>& seconds = reader_.info().seconds;

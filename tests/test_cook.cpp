@@ -189,7 +189,7 @@ TEST_CASE("the last layer but one is as fine as cells of two edges can show, and
     for (const auto& chunk : directory.chunks) {
         if (chunk.layer != 1) continue;
         ++count;
-        CHECK(chunk.error_p99 <= shown);
+        CHECK(chunk.error_p99 <= 1.05f * shown);  // where another track would open a gap, it stays a little above
         CHECK(chunk.error_p99 > 0.3f * shown);
     }
     CHECK(count >= directory.windows.size());

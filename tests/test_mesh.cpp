@@ -217,6 +217,30 @@ TEST_CASE("torus: closed, genus one, within bounds") {
     check_ranges(m);
 }
 
+TEST_CASE("quads are split along the diagonal that bends less") {
+    constexpr double minor = 0.12;
+    constexpr float cell = 0.06f;
+    Cloud cloud;
+    add_torus(cloud, 1, minor, 160);
+    const RealField real(cloud);
+    const Mesh m = mesh(real.field, {.cell = cell});
+    const auto normal = [&](const Vec& p) {
+        const double across = std::hypot(p[0], p[1]), out = across - 1, length = std::hypot(out, p[2]);
+        return Vec{out * p[0] / (across * length), out * p[1] / (across * length), p[2] / length};
+    };
+    const auto bend = [&](uint32_t a, uint32_t b) { return std::abs(dot(normal(m.at(b)) - normal(m.at(a)), m.at(b) - m.at(a))); };
+    size_t quads = 0, wrong = 0;
+    for (size_t i = 0; i + 5 < m.indices.size(); i += 6) {
+        const uint32_t* q = &m.indices[i];
+        REQUIRE(q[0] == q[3]);
+        REQUIRE(q[2] == q[4]);
+        ++quads, wrong += bend(q[0], q[2]) > bend(q[1], q[5]) + 0.4 * cell;
+    }
+    INFO(wrong, " of ", quads);
+    CHECK(quads > 500);
+    CHECK(wrong * 100 < quads);
+}
+
 TEST_CASE("thin sheet of 1.5 cells: closed, one piece of its volume") {
     Cloud cloud;
     add_sheet(cloud, 1, 0.075, 0.09);

