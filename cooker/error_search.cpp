@@ -13,6 +13,7 @@ constexpr size_t most_attempts = 3;
 constexpr double finer_by = 0.1;    // an error below its target by more is bytes nobody asked for, and worth another attempt
 constexpr double most_finer = 0.3;  // of a tolerance, the next one
 constexpr double most_coarser = 2;
+constexpr double tells = 0.75;      // of a tolerance: of a smaller step the error is chance as much
 /// Of a target that is missed anyway: per cent of bytes that a per cent of error is worth. Where points tell, it is had for 1.2.
 constexpr double worth_bytes = 4;
 
@@ -39,7 +40,8 @@ std::optional<double> ErrorSearch::next() const {
     if (is_near(last.y) || attempts_.size() == most_attempts) return {};
     double power = edges_ < 0.2 ? 1.3 : 0.9;  // of the tolerance, by the error's
     if (attempts_.size() > 1) {
-        if (!is_met(last.y) && last.x < attempts_[attempts_.size() - 2].x && !is_met(last.y + std::max(slope(), 0.0) * std::log(most_finer))) return {};
+        const bool is_told = last.x - attempts_[attempts_.size() - 2].x < std::log(tells);
+        if (is_told && !is_met(last.y + std::max(slope(), 0.0) * std::log(most_finer))) return {};
         if (slope() > 0) power = std::clamp(1 / slope(), 0.7, 2.0);
     }
     return std::exp(last.x + std::clamp(-power * last.y, std::log(most_finer), std::log(most_coarser)));

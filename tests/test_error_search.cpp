@@ -59,6 +59,12 @@ TEST_CASE("an error that points do not tell ends the search, and the bytes that 
     CHECK(cheap.tolerance < start);
 }
 
+TEST_CASE("a small step that did not help is no reason to give up") {
+    const double start = first(0.25);
+    const Outcome found = search(0.25, [&](double t) { return t > 0.95 * start ? 1.2 : t > 0.8 * start ? 1.21 : 1.0; });
+    CHECK(found.ratio == 1.0);
+}
+
 TEST_CASE("one that falls too slowly to be met is still brought nearer for its bytes") {
     const double start = first(0.25);
     const Outcome found = search(0.25, [&](double t) { return 3 * std::pow(t / start, 0.5); });
