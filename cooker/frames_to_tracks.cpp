@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "mean_depth.h"
 #include "parallel.h"
 #include "points_to_mesh.h"
 #include "walls.h"
@@ -25,9 +26,6 @@ constexpr float credible = 3;                      // tolerances a correction ma
 // at most. Mean volume of pour_sphere .9985 → 1.0000, its violent frames .994 … .997 → .996 … 1.0005, a flat ball .96 → 1.00; bytes at equal
 // p99 of eight clips from two solvers −3.6 … +.5, on average −.9 %.
 constexpr float most_offset = 0.15f, least_most_offset = 0.05f;  // the latter edges: what cells cut off, finer points do not
-// Edges. Liquid that is lost, or that nobody has, says nothing of where the rest lies: a void in one frame of a splash of particles, gone later, had taken
-// 1 % of its volume.
-constexpr float most_of_lost = 0.02f;
 constexpr float few_points = 200;  // of as many, half is taken for chance: how each is rounded
 constexpr float too_near = 0.4f;                   // of the distance to the third neighbour; at .2, and surplus borne for
                                                    // 4 frames, dam_break took 14 % more bytes at equal error
@@ -181,40 +179,6 @@ Sweep mended_at(const Window& window, const CodedWindow& coded, size_t first, in
     return sweep;
 }
 
-/// How far the decoded surface lies inside the source's where both are near each other, on average of some of its triangles: metres.
-float near_depth(const SurfaceFrame& frame, const Mesh& decoded, const surface::Container& container, int jobs) {
-    constexpr size_t every = 7;
-    struct Sample {
-        float depth = 0, area = 0;
-    };
-    std::vector<Sample> samples(decoded.triangles.size() / every);
-    parallel_for(samples.size(), jobs, [&](size_t i) {
-        const Triangle& t = decoded.triangles[every * i];
-        const glm::vec3 &a = decoded.positions[t[0]], &b = decoded.positions[t[1]], &c = decoded.positions[t[2]], middle = (a + b + c) / 3.f;
-        if (!is_inside(middle, container)) return;
-        const SurfaceIndex::Hit hit = frame.index.closest(middle, frame.edge);
-        if (!(hit.distance < frame.edge)) return;
-        const Triangle& under = frame.mesh.triangles[hit.triangle];
-        const glm::vec3& corner = frame.mesh.positions[under[0]];
-        const glm::vec3 normal = glm::cross(frame.mesh.positions[under[1]] - corner, frame.mesh.positions[under[2]] - corner);
-        samples[i] = {glm::dot(hit.point - middle, normal) > 0 ? hit.distance : -hit.distance, glm::length(glm::cross(b - a, c - a))};
-    });
-    double sum = 0, area = 0;
-    for (const Sample& sample : samples) sum += double(sample.depth) * sample.area, area += sample.area;
-    return area > 0 ? float(sum / area) : 0;
-}
-
-/// The same by what volume is missing; liquid that is lost, or that nobody has, counts for little, for the rest cannot make up for it.
-float depth_of(const SurfaceFrame& frame, const Mesh& decoded, const surface::Container& container, int jobs) {
-    double area = 0;
-    for (size_t v = 0; v < frame.area.size(); ++v)
-        if (is_inside(frame.mesh.positions[v], container)) area += frame.area[v];
-    if (!(area > 0)) return 0;
-    const float depth = float((volume_inside(frame.mesh, container) - volume_inside(decoded, container)) / area);
-    const float near = near_depth(frame, decoded, container, jobs), most = most_of_lost * frame.edge;
-    return std::clamp(depth, near - most, near + most);
-}
-
 /// Births where coding has lost what the points meant: rims and thin liquid that a small shift tears.
 /// `changed`: the samples to look at (others have been found whole, or beyond mending); afterwards those with a new path.
 /// `depth`, where wanted: of the samples looked at, of the surface as it was.
@@ -233,7 +197,7 @@ void mend(Window& window, const CodedWindow& coded, const WindowGoal& goal, std:
         const SurfaceFrame& frame = *window.frames[size_t(s)];
         const std::vector<SurfacePoint> points = mended_at(window, coded, first, s).points;
         const Mesh decoded = mesh_points(points, frame.edge, goal.jobs, frame.mesh.positions.size());
-        if (depth) (*depth)[size_t(s)] = depth_of(frame, decoded, goal.container, goal.jobs) * float(points.size()) / (float(points.size()) + few_points);
+        if (depth) (*depth)[size_t(s)] = mean_depth(frame, decoded, goal.container, goal.jobs) * float(points.size()) / (float(points.size()) + few_points);
         for (Path& path : repair_surface(frame, s, points, decoded, repair_beyond * goal.tolerance, goal.jobs))
             window.paths.push_back(std::move(path));
     }
