@@ -7,7 +7,7 @@
 #include <new>
 
 #include "commands/commands.h"
-#include "interrupt.h"
+#include "common/interrupt.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Any bytes as a Draco file: read, or refused with an InputError.
-#include "draco_mesh.h"
 #include "fuzz_reader.h"
+#include "readers/draco_mesh.h"
 #include "shapes.h"
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {

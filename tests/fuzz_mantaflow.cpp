@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Any bytes as one of the files of a Mantaflow cache. The first byte says which; whether the rest is packed first, or
 // taken for the gzip stream itself.
+#include "frames/open_sequence.h"
 #include "fuzz_harness.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
 #include "shapes.h"
 

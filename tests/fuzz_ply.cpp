@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Any bytes as a PLY file.
+#include "frames/open_sequence.h"
 #include "fuzz_harness.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
 #include "shapes.h"
 

@@ -3,8 +3,8 @@
 #pragma once
 #include <algorithm>
 
+#include "frames/open_sequence.h"
 #include "fuzz_harness.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
 
 namespace fuzz {

@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "chunks_to_asset.h"
+#include "asset/chunks_to_asset.h"
+#include "asset/layers_to_chunks.h"
 #include "format/crc32.h"
-#include "layers_to_chunks.h"
 #include "rill/host.h"
 #include "rill/rill.h"
 

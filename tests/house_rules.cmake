@@ -35,3 +35,14 @@ forbid("the runtime knows the standard library and GLM only"
   "^#include (\"[^\"]*cooker|<(Eigen|nlohmann|nanoflann|zlib|draco|meshopt|CLI)|<iostream>)" runtime)
 forbid("only the runtime itself includes its src/" "^#include \"(runtime/)?src/" cooker sample_app)
 forbid("a game sees rill/*.h only" "^#include \"(format|surface|cooker)/" sample_app)
+
+# Stages know what comes before them, never what comes after.
+set(stages common measure readers writers frames asset tracks verify cook rivals commands)
+set(later ${stages})
+foreach(stage ${stages})
+  list(REMOVE_ITEM later ${stage})
+  if(later)
+    string(JOIN "|" names ${later})
+    forbid("${stage}/ comes before" "^#include \"(${names})/" cooker/${stage})
+  endif()
+endforeach()

@@ -3,7 +3,7 @@
 #pragma once
 #include <doctest/doctest.h>
 
-#include "readers/reader.h"
+#include "frames/open_sequence.h"
 #include "sequence_files.h"
 
 /// Opens and reads every frame; the text of the InputError, or "" when all is well.

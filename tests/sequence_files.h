@@ -8,7 +8,7 @@
 #include <fstream>
 #include <string>
 
-#include "scratch_folder.h"
+#include "common/scratch_folder.h"
 
 struct TestFolder : rill::cooker::ScratchFolder {
     std::string operator/(const std::string& name) const { return (path / name).string(); }

@@ -3,7 +3,7 @@
 #pragma once
 #include <cmath>
 
-#include "mesh.h"
+#include "common/mesh.h"
 
 /// Closed, outward wound: poles and `n` segments round, n/2 rows.
 inline rill::cooker::Mesh sphere(uint32_t n, float radius, const glm::vec3& centre = {}, float bumps = 0) {

@@ -10,11 +10,11 @@
 #include <memory>
 #include <random>
 
+#include "asset/layers_to_chunks.h"
 #include "basis_tables.h"
+#include "common/mesh.h"
 #include "format/chunk_statistics.h"
 #include "format/lattice.h"
-#include "layers_to_chunks.h"
-#include "mesh.h"
 #include "src/coefficients_to_points.h"
 
 using namespace rill;

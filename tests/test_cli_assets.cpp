@@ -5,6 +5,7 @@
 #include <set>
 
 #include "cli_harness.h"
+#include "frames/open_sequence.h"
 
 TEST_CASE("info") {
     const Result text = run_rill("info " + clip().asset), as_json = run_rill("info --json " + clip().asset);

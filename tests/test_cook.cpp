@@ -8,13 +8,14 @@
 #include <cmath>
 #include <functional>
 
-#include "asset_directory.h"
-#include "asset_player.h"
-#include "cook.h"
+#include "asset/asset_directory.h"
+#include "asset/asset_player.h"
+#include "cook/cook.h"
+#include "frames/open_sequence.h"
+#include "measure/surface_distance.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "surface_distance.h"
-#include "verify.h"
+#include "verify/verify.h"
 
 using namespace rill::cooker;
 

@@ -8,14 +8,15 @@
 #include <map>
 #include <set>
 
-#include "asset_directory.h"
-#include "cook.h"
-#include "cut_to_closed.h"
-#include "rings_to_triangles.h"
+#include "asset/asset_directory.h"
+#include "cook/cook.h"
+#include "frames/cut_to_closed.h"
+#include "frames/open_sequence.h"
+#include "frames/rings_to_triangles.h"
+#include "measure/surface_distance.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "surface_distance.h"
-#include "verify.h"
+#include "verify/verify.h"
 
 using namespace rill::cooker;
 

@@ -3,8 +3,8 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
-#include "mean_depth.h"
 #include "shapes.h"
+#include "tracks/mean_depth.h"
 
 using namespace rill;
 using namespace rill::cooker;

@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "error_target.h"
+#include "cook/error_target.h"
+#include "measure/surface_distance.h"
 #include "shapes.h"
-#include "surface_distance.h"
 
 using namespace rill::cooker;
 constexpr float infinity = std::numeric_limits<float>::infinity();

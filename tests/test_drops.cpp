@@ -8,8 +8,8 @@
 
 #include "basis_tables.h"
 #include "mesh_harness.h"
-#include "pipeline.h"
 #include "shapes.h"
+#include "tracks/pipeline.h"
 
 using namespace rill::cooker;
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "error_search.h"
+#include "cook/error_search.h"
 
 using namespace rill::cooker;
 

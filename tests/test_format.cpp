@@ -7,7 +7,7 @@
 
 #include <limits>
 
-#include "asset_player.h"
+#include "asset/asset_player.h"
 #include "format/check.h"
 #include "format/cursor.h"
 #include "format/lattice.h"

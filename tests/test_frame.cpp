@@ -5,8 +5,8 @@
 
 #include <memory>
 
-#include "asset_player.h"
-#include "surface_distance.h"
+#include "asset/asset_player.h"
+#include "measure/surface_distance.h"
 
 using namespace harness;
 using rill::Status;

@@ -21,7 +21,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cook.h"
+#include "cook/cook.h"
 #include "rill/rill.h"
 #include "shapes.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "rate_search.h"
+#include "cook/rate_search.h"
 
 using namespace rill::cooker;
 

@@ -5,9 +5,9 @@
 
 #include <limits>
 
-#include "draco_mesh.h"
+#include "frames/open_sequence.h"
 #include "reader_faults.h"
-#include "readers/reader.h"
+#include "readers/draco_mesh.h"
 #include "sequence_files.h"
 #include "shapes.h"
 #include "writers/frame_writer.h"

@@ -7,8 +7,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 
+#include "frames/open_sequence.h"
 #include "reader_faults.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
 #include "shapes.h"
 

@@ -3,11 +3,11 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include "frames/open_sequence.h"
+#include "measure/surface_distance.h"
 #include "reader_faults.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "surface_distance.h"
 
 using namespace rill::cooker;
 namespace fs = std::filesystem;

@@ -3,10 +3,10 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include "frames/open_sequence.h"
+#include "measure/surface_distance.h"
 #include "reader_faults.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
-#include "surface_distance.h"
 
 using namespace rill::cooker;
 

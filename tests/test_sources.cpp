@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asset_player.h"
-#include "cook.h"
+#include "asset/asset_player.h"
+#include "cook/cook.h"
+#include "frames/split_edges.h"
+#include "frames/weld_seams.h"
+#include "measure/surface_distance.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "split_edges.h"
-#include "surface_distance.h"
-#include "weld_seams.h"
 
 using namespace rill::cooker;
 

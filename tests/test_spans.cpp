@@ -5,12 +5,12 @@
 
 #include <cmath>
 
-#include "asset_player.h"
-#include "cook.h"
-#include "parts_to_asset.h"
+#include "asset/asset_player.h"
+#include "cook/cook.h"
+#include "cook/parts_to_asset.h"
+#include "measure/surface_distance.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "surface_distance.h"
 
 using namespace rill::cooker;
 namespace fs = std::filesystem;

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 
-#include "pipeline.h"
-#include "points_to_mesh.h"
+#include "measure/surface_distance.h"
 #include "shapes.h"
-#include "surface_distance.h"
-#include "torn_necks.h"
+#include "tracks/pipeline.h"
+#include "tracks/points_to_mesh.h"
+#include "tracks/torn_necks.h"
 
 using namespace rill::cooker;
 

@@ -7,10 +7,10 @@
 #include <algorithm>
 
 #include "basis_tables.h"
-#include "frames_to_tracks.h"
-#include "points_to_mesh.h"
 #include "shapes.h"
-#include "surface_response.h"
+#include "tracks/frames_to_tracks.h"
+#include "tracks/points_to_mesh.h"
+#include "tracks/surface_response.h"
 
 using namespace rill::cooker;
 

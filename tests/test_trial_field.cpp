@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "trial_field.h"
+#include "tracks/trial_field.h"
 
 using namespace rill;
 using namespace rill::cooker;

@@ -5,13 +5,13 @@
 
 #include <cmath>
 
-#include "check_velocity.h"
-#include "surface_motion.h"
+#include "frames/check_velocity.h"
+#include "frames/open_sequence.h"
+#include "frames/surface_motion.h"
+#include "measure/surface_distance.h"
 #include "reader_faults.h"
-#include "readers/reader.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "surface_distance.h"
 
 using namespace rill::cooker;
 

@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "harness.h"
-#include "motion.h"
-#include "shapes.h"
+#include "measure/thin_liquid.h"
+#include "measure/velocity_error.h"
 #include "sequence_files.h"
-#include "thin_liquid.h"
-#include "velocity_error.h"
-#include "verify.h"
+#include "shapes.h"
+#include "verify/motion.h"
+#include "verify/verify.h"
 
 using namespace rill::cooker;
 

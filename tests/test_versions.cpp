@@ -4,10 +4,10 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <nlohmann/json.hpp>
 
-#include "asset_directory.h"
-#include "asset_player.h"
+#include "asset/asset_directory.h"
+#include "asset/asset_player.h"
 #include "harness.h"
-#include "surface_distance.h"
+#include "measure/surface_distance.h"
 
 using namespace harness;
 namespace cooker = rill::cooker;

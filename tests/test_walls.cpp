@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asset_directory.h"
-#include "asset_player.h"
-#include "cook.h"
+#include "asset/asset_directory.h"
+#include "asset/asset_player.h"
+#include "cook/cook.h"
+#include "frames/walls.h"
+#include "measure/surface_distance.h"
 #include "sequence_files.h"
 #include "shapes.h"
-#include "surface_distance.h"
-#include "walls.h"
 
 using namespace rill::cooker;
 using rill::surface::Container, rill::surface::container_of;

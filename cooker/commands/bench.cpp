@@ -4,10 +4,10 @@
 #include <optional>
 #include <thread>
 
-#include "asset_directory.h"
+#include "asset/asset_directory.h"
 #include "commands/bench_detail.h"
 #include "commands/commands.h"
-#include "draco_mesh.h"
+#include "readers/draco_mesh.h"
 
 namespace rill::cooker {
 namespace {

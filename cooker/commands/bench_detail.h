@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "commands/bench_player.h"
-#include "surface_distance.h"
+#include "measure/surface_distance.h"
 
 namespace rill::cooker {
 

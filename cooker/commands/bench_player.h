@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh.h"
+#include "common/mesh.h"
 #include "rill/host.h"
 #include "rill/rill.h"
 

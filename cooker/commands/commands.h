@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "cook/verdict.h"
 #include "readers/reader.h"
-#include "verdict.h"
 
 namespace rill::cooker {
 

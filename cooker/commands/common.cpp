@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include "commands/commands.h"
-#include "interrupt.h"
-#include "output_file.h"
+#include "common/interrupt.h"
+#include "common/output_file.h"
 
 namespace rill::cooker {
 namespace {

@@ -5,13 +5,14 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "asset_player.h"
-#include "byte_account.h"
+#include "asset/asset_player.h"
+#include "asset/byte_account.h"
 #include "commands/commands.h"
-#include "cook.h"
-#include "rivals.h"
-#include "scratch_folder.h"
-#include "verify.h"
+#include "common/scratch_folder.h"
+#include "cook/cook.h"
+#include "frames/open_sequence.h"
+#include "rivals/rivals.h"
+#include "verify/verify.h"
 
 namespace rill::cooker {
 namespace {

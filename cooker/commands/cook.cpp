@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "cook.h"
+#include "cook/cook.h"
 
 #include <cstdio>
 #include <filesystem>
 
 #include "commands/commands.h"
-#include "output_file.h"
+#include "common/output_file.h"
 
 namespace rill::cooker {
 namespace {

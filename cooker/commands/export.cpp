@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "asset_directory.h"
-#include "asset_player.h"
+#include "asset/asset_directory.h"
+#include "asset/asset_player.h"
 #include "commands/commands.h"
-#include "output_file.h"
+#include "common/output_file.h"
 #include "writers/frame_writer.h"
 
 namespace rill::cooker {

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "asset_directory.h"
-#include "byte_account.h"
+#include "asset/asset_directory.h"
+#include "asset/byte_account.h"
 #include "commands/commands.h"
 #include "rill/rill.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "commands/commands.h"
-#include "parts_to_asset.h"
+#include "cook/parts_to_asset.h"
 
 namespace rill::cooker {
 namespace {

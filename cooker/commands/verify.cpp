@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "verify.h"
+#include "verify/verify.h"
 
 #include <algorithm>
 #include <cstdio>
 
 #include "commands/commands.h"
-#include "output_file.h"
+#include "common/output_file.h"
 
 namespace rill::cooker {
 namespace {

@@ -6,8 +6,8 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
-#include "draco_mesh.h"
-#include "number_place.h"
+#include "common/number_place.h"
+#include "readers/draco_mesh.h"
 #include "readers/file_bytes.h"
 
 namespace rill::cooker {

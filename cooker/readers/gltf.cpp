@@ -20,7 +20,7 @@
 #define TINYGLTF_USE_CPP14
 #include <tiny_gltf.h>
 
-#include "draco_mesh.h"
+#include "readers/draco_mesh.h"
 #include "readers/file_bytes.h"
 #include "readers/frame_files.h"
 #include "readers/velocity_names.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "mesh.h"
+#include "common/mesh.h"
 
 namespace rill::cooker {
 

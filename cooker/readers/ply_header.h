@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh.h"
+#include "common/mesh.h"
 
 namespace rill::cooker {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh.h"
+#include "common/mesh.h"
 
 namespace rill::cooker {
 
@@ -56,7 +56,7 @@ public:
     virtual std::vector<std::filesystem::path> files(size_t index) const = 0;
 };
 
-/// Looks at the path and picks the reader. Throws InputError.
-std::unique_ptr<SequenceReader> open_sequence(const std::string& input, const ReadOptions& options);
+/// Looks at the path and picks the reader: frames as they come, where frames/open_sequence.h checks them. Throws InputError.
+std::unique_ptr<SequenceReader> open_reader(const std::string& input, const ReadOptions& options);
 
 }  // namespace rill::cooker

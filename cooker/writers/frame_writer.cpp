@@ -4,8 +4,8 @@
 #include <charconv>
 #include <cstdio>
 
-#include "number_place.h"
-#include "output_file.h"
+#include "common/number_place.h"
+#include "common/output_file.h"
 
 namespace rill::cooker {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "mesh.h"
+#include "common/mesh.h"
 
 namespace rill::cooker {
 

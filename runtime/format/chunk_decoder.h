@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Chunk bytes → tracks. The encoder half is cooker/layers_to_chunks.cpp; FORMAT.md describes the bits.
+// Chunk bytes → tracks. The encoder half is cooker/asset/layers_to_chunks.cpp; FORMAT.md describes the bits.
 #pragma once
 #include <cstddef>
 #include <cstdint>

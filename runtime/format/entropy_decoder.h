@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Bits out of bytes: a binary range decoder, and the adaptive probabilities that steer it. All integer, so
-// that every machine decodes the same. The encoding half is cooker/entropy_encoder.h.
+// that every machine decodes the same. The encoding half is cooker/asset/entropy_encoder.h.
 #pragma once
 #include <array>
 #include <cstddef>

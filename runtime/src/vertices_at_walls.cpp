@@ -13,7 +13,7 @@ namespace {
 
 // Meshers that march cubes cut rims off, by less than a cell; so do these vertices, then by as much on average. p99 and mean error of two
 // splashes at 0.12e and 0.25e with 0 to .7 of the way: the same to a hundredth; edges between walls that are no bevels are better off
-// with some of it (volume of a tank -.7 % with 0). Where a source's surface was cut through (cooker/cut_to_closed.h) its rims are
+// with some of it (volume of a tank -.7 % with 0). Where a source's surface was cut through (cooker/frames/cut_to_closed.h) its rims are
 // sharp: a part of a splash .36 edges with .3, .29 with 1.
 constexpr float rim_share = 0.3f;
 // Where liquid ends before a bevel, by less than this, in cells, it goes on to it. p99 of a tank and of a pour

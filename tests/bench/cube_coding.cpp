@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "../basis_tables.h"
+#include "asset/layers_to_chunks.h"
+#include "common/parallel.h"
 #include "format/layout.h"
-#include "layers_to_chunks.h"
-#include "parallel.h"
 
 namespace rill::bench {
 namespace {

@@ -12,7 +12,7 @@
 #include <cstdlib>
 #include <map>
 
-#include "readers/reader.h"
+#include "frames/open_sequence.h"
 #include "writers/frame_writer.h"
 
 namespace {

@@ -8,7 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <map>
 
-#include "parallel.h"
+#include "common/parallel.h"
 
 namespace rill::bench {
 namespace {

@@ -7,8 +7,8 @@
 #include <map>
 #include <random>
 
+#include "common/parallel.h"
 #include "decoded_field.h"
-#include "parallel.h"
 
 namespace rill::bench {
 namespace {

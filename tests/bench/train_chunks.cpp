@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "asset_directory.h"
+#include "asset/asset_directory.h"
+#include "common/mesh.h"
 #include "format/chunk_walk.h"
-#include "mesh.h"
 
 namespace {
 namespace format = rill::format;

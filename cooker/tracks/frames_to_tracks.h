@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// One window: frames in, coded tracks out; the loop that drives the stages of pipeline.h.
+#pragma once
+#include <vector>
+
+#include "surface/container.h"
+#include "tracks/pipeline.h"
+
+namespace rill::cooker {
+
+/// What the loop aims at; everything scales with the tolerance.
+struct WindowGoal {
+    float tolerance = 0;          ///< metres: births where the decoded surface misses the source by more
+    Quantiser quantiser{};
+    glm::vec3 origin{};
+    surface::Container container = surface::everywhere;  ///< what the runtime will cut the surface off at
+    int jobs = 0;
+};
+struct CodedWindow {
+    std::vector<QuantisedTrack> tracks;   ///< of Window::paths, in their order; then the drops
+    std::vector<TrackSamples> decoded;    ///< what each decodes to
+    Quantiser quantiser{};                ///< the goal's, with the step of slip
+};
+
+/// Fills window.paths: survivors of the window before (points on its last frame) are carried on, then births and
+/// corrections alternate until nothing is missed.
+void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal);
+/// Quantises the tracks and corrects them against what they decode to.
+CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables);
+/// Adds to the distances of vertices (Residual) what makes `offset` metres outside the source the aim. Walls stay where they are.
+void aim_outside(const SurfaceFrame& frame, const surface::Container& container, float offset, std::vector<float>& distance);
+/// Chooses the coefficients of all tracks anew, so that together they decode to the least error for their bits.
+/// `offset`: metres outside the source that are aimed at, by sample.
+void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset);
+/// Steps of mean heights that bring the volume of pieces of few points nearer to the source's.
+void refit_volume(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
+/// Those that reach the last sample, as one-sample paths: what the next window continues.
+std::vector<Path> survivors_of(const Window& window);
+/// Decoded points at a sample; `ids`: the tracks they belong to; `only`: of those.
+std::vector<SurfacePoint> decoded_points(const std::vector<TrackSamples>& decoded, int sample, std::vector<uint32_t>* ids = nullptr,
+                                         const std::vector<bool>* only = nullptr);
+
+}  // namespace rill::cooker
