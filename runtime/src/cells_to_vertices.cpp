@@ -255,9 +255,7 @@ private:
             }
             move_to_parent(s, *drawn, s.at[i], v);
             const uint32_t vertex = drawn->first_vertex + begin + s.slot[i];
-            std::memcpy(m.position + 3 * size_t(vertex), v.position, sizeof(v.position));
-            std::memcpy(m.normal + 3 * size_t(vertex), v.normal, sizeof(v.normal));
-            m.of_field[vertex] = v.of_field;
+            m.vertices[vertex] = {{v.position[0], v.position[1], v.position[2], 0}, {v.normal[0], v.normal[1], v.normal[2], v.of_field ? 1.f : 0.f}};
             cover(*drawn, v.position);
             if (!m.input.target) continue;
             write3(m.input.target->position, vertex, v.position);
@@ -267,16 +265,14 @@ private:
     /// The same for nearly all there are, with nothing read twice.
     void write_drawn(const MesherScratch& s, uint32_t begin, uint32_t first, uint32_t last, const float* velocity) const {
         const Stream to = m.input.target ? m.input.target->position : Stream{}, moving = velocity ? m.input.target->velocity : Stream{};
-        float *const position = m.position, *const normal = m.normal;
-        uint8_t* const of_field = m.of_field;
+        PlacedVertex* const vertices = m.vertices;
         float lower[3], upper[3];
         for (uint32_t a = 0; a < 3; ++a) lower[a] = drawn->lower[a], upper[a] = drawn->upper[a];
         for (uint32_t i = first; i < last; ++i) {
             const uint32_t vertex = drawn->first_vertex + begin + s.slot[i];
             const float p[3] = {s.to[0][i], s.to[1][i], s.to[2][i]}, n[3] = {s.normal[0][i], s.normal[1][i], s.normal[2][i]};
             for (uint32_t a = 0; a < 3; ++a) lower[a] = std::min(lower[a], p[a]), upper[a] = std::max(upper[a], p[a]);
-            std::memcpy(position + 3 * size_t(vertex), p, sizeof(p)), std::memcpy(normal + 3 * size_t(vertex), n, sizeof(n));
-            of_field[vertex] = s.of_field[i];
+            vertices[vertex] = {{p[0], p[1], p[2], 0}, {n[0], n[1], n[2], s.of_field[i] ? 1.f : 0.f}};
             write3(to, vertex, p);
             if (!moving.data) continue;
             const float* v = velocity + i - first;

@@ -49,9 +49,7 @@ size_t carve(void* memory, const MeshLimits& limits, Mesher& m) {
     m.next_active = carver.take<uint32_t>(limits.tiles);
     m.order = carver.take<OrderedTile>(limits.tiles);
     m.drops = carver.take<SmallDrop>(limits.drops);
-    m.position = carver.take<float>(3 * size_t(limits.vertices));
-    m.normal = carver.take<float>(3 * size_t(limits.vertices));
-    m.of_field = carver.take<uint8_t>(limits.vertices);
+    m.vertices = carver.take<PlacedVertex>(limits.vertices);
     m.scratch = carver.take<MesherScratch>(limits.workers);
     return carver.used;
 }

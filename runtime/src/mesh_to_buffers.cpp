@@ -130,7 +130,7 @@ private:
             const uint32_t cell = home - ((step & 1) << 3 * u) - (step >> 1 << 3 * v) + ((beyond & 1) << (3 * u + 3)) +
                                   (beyond >> 1 << (3 * v + 3));
             round[k] = vertex_of(*near.tile[(beyond & 1) << u | beyond >> 1 << v], cell, edge);
-            if (beyond) cover(tile, m.position + 3 * size_t(round[k]));
+            if (beyond) cover(tile, m.vertices[round[k]].position);
         }
     }
 };
@@ -172,7 +172,7 @@ Range range_of_drops(const Mesher& m, uint32_t number, uint32_t first_index) {
 bool splits_first(const Mesher& m, float cell, const uint32_t index[4]) noexcept {
     constexpr float share_of_length = 0.1f;  // where nothing bends, the shorter
     Vector p[4], n[4];
-    for (uint32_t k = 0; k < 4; ++k) p[k] = load(m.position + 3 * size_t(index[k])), n[k] = load(m.normal + 3 * size_t(index[k]));
+    for (uint32_t k = 0; k < 4; ++k) p[k] = load(m.vertices[index[k]].position), n[k] = load(m.vertices[index[k]].normal);
     const auto facing = [&](uint32_t from) {  // one way, when split there
         const Vector &q = p[from], across = p[from + 2] - q;
         return dot(cross(p[from + 1] - q, across), cross(across, p[(from + 3) & 3] - q)) > 0;

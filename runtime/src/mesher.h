@@ -70,6 +70,13 @@ struct Vertex {
     bool of_field;               ///< the normal
 };
 
+/// One that has been placed, for its neighbours to look at.
+struct PlacedVertex {
+    float position[4];           ///< as written to the target
+    float normal[4];             ///< of what it lies on; [3]: 1 if that is the field, 0 if it is walls
+    bool of_field() const { return normal[3] != 0; }
+};
+
 /// Where the target wants it; nowhere if it does not.
 inline void write3(const Stream& stream, uint32_t index, const float (&v)[3]) {
     if (stream.data) std::memcpy(static_cast<uint8_t*>(stream.data) + size_t(index) * stream.stride, v, sizeof(v));
@@ -157,9 +164,7 @@ struct Mesher {
     uint32_t order_count, kept;  ///< tiles with surface; how many of them are drawn
     SmallDrop* drops;            ///< by their number in the field
     uint32_t drop_count, drops_kept;  ///< drops; how many of them are drawn if they have a mesh, after all tiles
-    float* position;             ///< 3 per vertex, as written to the target
-    float* normal;               ///< 3 per vertex, of what it lies on
-    uint8_t* of_field;           ///< per vertex: its normal is the gradient, not that of walls
+    PlacedVertex* vertices;      ///< those of the target
     MesherScratch* scratch;      ///< one per worker
 };
 

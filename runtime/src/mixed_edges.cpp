@@ -118,7 +118,7 @@ uint32_t write_polygon(const Mesher& m, Tile& tile, const Quarter quarters[4], b
     uint32_t index[4], ring[4], count = 0;
     for (uint32_t k = 0; k < 4; ++k) {
         index[k] = vertex_of(quarters[k]);
-        cover(tile, m.position + 3 * size_t(index[k]));
+        cover(tile, m.vertices[index[k]].position);
         if (!same_cell(quarters[k], quarters[(k + 3) & 3])) ring[count++] = index[k];
     }
     if (!out) return count == 4 ? 6 : 3;

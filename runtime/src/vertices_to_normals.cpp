@@ -59,8 +59,8 @@ struct TileNormals {
     Vector lean(const Vector& own, const Ring& ring, uint32_t cell, uint32_t self) const {
         Vector at[Ring::most + 1], around{};
         for (uint32_t k = 0; k < ring.count; ++k) {
-            const size_t other = 3 * size_t(vertex_beyond(cell, ring.face[k], ring.edge[k], self));
-            at[k] = load(m.position + other), around = around + load(m.normal + other);
+            const PlacedVertex& other = m.vertices[vertex_beyond(cell, ring.face[k], ring.edge[k], self)];
+            at[k] = load(other.position), around = around + load(other.normal);
         }
         at[ring.count] = at[0];
         // The triangles to the vertex add up to any others between those round it: two of them are the product of diagonals.
@@ -77,13 +77,14 @@ struct TileNormals {
     /// How much of what is drawn at a vertex is not that of larger cells.
     float still_here(uint32_t vertex) const {
         if (!m.input.levels.eye_count) return 1;
-        return 1 - m.input.levels.morph(tile.level, m.position + 3 * size_t(vertex));
+        return 1 - m.input.levels.morph(tile.level, m.vertices[vertex].position);
     }
 
     void write(const Ring& ring, uint32_t cell, uint32_t self) const {
-        Vector normal = load(m.normal + 3 * size_t(self));
-        if (tile.level == 0 && m.of_field[self]) normal = lean(normal, ring, cell, self);
-        write3(m.input.target->normal, self, {normal.x, normal.y, normal.z});
+        const PlacedVertex& vertex = m.vertices[self];
+        Vector normal = load(vertex.normal);
+        if (tile.level == 0 && vertex.of_field()) normal = lean(normal, ring, cell, self);
+        write3(m.input.target->normal, self, {normal.at[0], normal.at[1], normal.at[2]});
     }
 
     void write_cell(uint32_t cell) const {
