@@ -36,6 +36,16 @@ TEST_CASE("liquid that is lost or that nobody has is not what the rest lies insi
     CHECK(depth(sphere(96, 1), false_liquid) > 0.075f);
 }
 
+TEST_CASE("of thin liquid, that counts for a quarter of a per cent of its volume at most") {
+    Mesh sheet = sphere(96, 1);
+    for (glm::vec3& x : sheet.positions) x.z *= 0.04f;
+    Mesh with_more = sheet;
+    append(with_more, sphere(48, 0.3f, {2, 0, 0}));
+    const double volume_over_area = 0.04 * 4 / 3 * 3.14 / 6.3;
+    CHECK(depth(with_more, sheet) > 0);
+    CHECK(depth(with_more, sheet) * edge < 0.004 * volume_over_area);  // the ball has volume and surface, too
+}
+
 TEST_CASE("what lies beyond a wall is nobody's concern") {
     surface::Container half = surface::everywhere;
     half.lower[0] = 0;

@@ -260,10 +260,11 @@ TEST_CASE("a drop keeps its volume when it is coded, whatever its axes are round
 }
 
 TEST_CASE("what hangs on a needle is held by a drop, and what does not hang together stays apart") {
-    constexpr float ball = 3, apart = 3.6f;
-    for (int k = 0; k < 6; ++k) {  // wherever cells lie
+    constexpr float ball = 3;
+    for (int k = 0; k < 9; ++k) {  // wherever cells lie; the last just between their corners, and longer
         CAPTURE(k);
-        const glm::vec3 middle = 0.17f * float(k) * edge * glm::vec3(1, 2, 3);
+        const float apart = k < 6 ? 3.6f : 4.2f;
+        const glm::vec3 middle = edge * (k < 6 ? 0.17f * float(k) * glm::vec3(1, 2, 3) : glm::vec3(0.3f * float(k - 6), 0.4f, 0.47f));
         Mesh source = dumbbell(edge, ball, 0.1f, apart), two;
         for (glm::vec3& x : source.positions) x += middle;
         std::vector<SurfacePoint> points;

@@ -378,3 +378,20 @@ TEST_CASE("small pieces of points have their volume, too, beside a large one tha
     CHECK(std::fabs(volumes()[1] - 1) < 0.035);
     CHECK(volumes()[0] == doctest::Approx(large).epsilon(1e-5));
 }
+
+TEST_CASE("pieces that have run into one keep their volume: it is not one's alone") {
+    Window window = standing_ball();
+    const float edge = window.frames[0]->edge;
+    Mesh both = sphere(64, radius);
+    append(both, sphere(32, 6 * edge, {radius + 6.25f * edge, 0, 0}));
+    const auto frame = std::make_shared<const SurfaceFrame>(both, edge);
+    for (auto& motion : window.motion) motion.assign(both.positions.size(), glm::vec3(0));
+    std::fill(window.frames.begin(), window.frames.end(), frame);
+    const WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    const CodedWindow coded = code_tracks(window, goal, tables());
+    const Mesh decoded = mesh_points(decoded_points(coded.decoded, 5), edge);
+    const std::vector<uint32_t> label = label_components(decoded);
+    CHECK(signed_volume(decoded) == doctest::Approx(signed_volume(both)).epsilon(0.01));
+    CHECK(std::count(label.begin(), label.end(), label[0]) == std::ptrdiff_t(label.size()));  // or this tells nothing
+}

@@ -2,6 +2,7 @@
 #include "tracks/mean_depth.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "common/parallel.h"
@@ -10,7 +11,10 @@
 namespace rill::cooker {
 namespace {
 
-constexpr float most_of_lost = 0.02f;  // edges
+// What is lost, or false, counts for so much at most. Thin liquid has much surface for its volume: a frame of a stream into a glass, torn when
+// it was measured, had 15 951 cubic edges for 15 661, and a 50th of an edge would have taken 1.3 % off it.
+constexpr float most_of_lost = 0.02f;       // edges
+constexpr double most_of_volume = 0.0025;
 
 /// How far the decoded surface lies inside the source's where both are near each other, on average of some of its triangles: metres.
 float near_depth(const SurfaceFrame& frame, const Mesh& decoded, const surface::Container& container, int jobs) {
@@ -42,8 +46,9 @@ float mean_depth(const SurfaceFrame& frame, const Mesh& decoded, const surface::
     for (size_t v = 0; v < frame.area.size(); ++v)
         if (is_inside(frame.mesh.positions[v], container)) area += frame.area[v];
     if (!(area > 0)) return 0;
-    const float depth = float((volume_inside(frame.mesh, container) - volume_inside(decoded, container)) / area);
-    const float near = near_depth(frame, decoded, container, jobs), most = most_of_lost * frame.edge;
+    const double volume = volume_inside(frame.mesh, container);
+    const float depth = float((volume - volume_inside(decoded, container)) / area);
+    const float near = near_depth(frame, decoded, container, jobs), most = std::min(most_of_lost * frame.edge, float(most_of_volume * std::fabs(volume) / area));
     return std::clamp(depth, near - most, near + most);
 }
 

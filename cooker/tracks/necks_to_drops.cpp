@@ -15,7 +15,8 @@ namespace {
 
 // Edges.
 constexpr float longest_gap = 3;                    // farther apart, it is no neck
-constexpr float radii[] = {0.45f, 0.6f, 0.75f};     // across it, the first that holds; drawn larger, for it touches both sides
+constexpr float radii[] = {0.45f, 0.6f, 0.75f, 0.9f};  // across it, the first that holds; drawn larger, for it touches both sides
+constexpr float leans[] = {0, 0.5f};                // of the way to the nearest corner of the cells; a strand just between them would take twice as wide a drop
 constexpr float overlap = 0.6f;                     // into either side
 constexpr float coded_off = 0.1f;                   // as much thinner it still has to hold
 constexpr float apart = 0.8f;                       // from other liquid
@@ -77,15 +78,18 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
     if (piece_at(from) != piece || piece_at(to) != piece) return {};
     const NeckCorners corners(neck, edge, around_neck * edge, decoded);
     const std::vector<float> torn = field.values_at(corners.x, corners.y, corners.z);
-    for (const float radius : radii) {
-        Spindle spindle{0.5f * (from + to), gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1), std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge};
-        if (!is_alone(spindle, piece, frame, label)) return {};
-        const Drop drop = spindle.drop();
-        spindle.draw(edge, coded_off * edge);
-        std::vector<float> held = torn;
-        for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], spindle.value({corners.x[i], corners.y[i], corners.z[i]}));
-        if (!corners.is_amiss(held, torn)) return drop;
-    }
+    const glm::vec3 middle = 0.5f * (from + to), axis = gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1);
+    const glm::vec3 corner = edge * glm::round(middle / edge) - middle, aside = corner - glm::dot(corner, axis) * axis;
+    for (const float lean : leans)
+        for (const float radius : radii) {
+            Spindle spindle{middle + lean * aside, axis, std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge};
+            if (!is_alone(spindle, piece, frame, label)) return {};
+            const Drop drop = spindle.drop();
+            spindle.draw(edge, coded_off * edge);
+            std::vector<float> held = torn;
+            for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], spindle.value({corners.x[i], corners.y[i], corners.z[i]}));
+            if (!corners.is_amiss(held, torn)) return drop;
+        }
     return {};
 }
 

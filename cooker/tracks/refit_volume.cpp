@@ -103,7 +103,23 @@ private:
         std::map<uint32_t, double> sum;
         for (uint32_t v = 0; v < volume.size(); ++v)
             if (volume[v] != 0) sum[label_at(decoded.positions[v])] += volume[v];
+        for (const auto& [name, home] : joined(decoded, label, sum)) sum[home] -= pieces[name].volume;
         for (auto& [name, piece] : pieces) piece.missing = 1 - sum[name] / piece.volume;
+    }
+    /// Pieces that nothing decoded is counted for, `sum`, and which other they have run into: what is decoded there is both.
+    std::map<uint32_t, uint32_t> joined(const Mesh& decoded, const std::vector<uint32_t>& label, const std::map<uint32_t, double>& sum) const {
+        std::map<uint32_t, uint32_t> homes;
+        const auto is_joined = [&](const auto& piece) { return !sum.count(piece.first); };
+        if (decoded.positions.empty() || std::none_of(pieces.begin(), pieces.end(), is_joined)) return homes;
+        const VertexTree tree(decoded.positions);
+        std::vector<VertexTree::Found> found;
+        for (size_t i = 0; i < few_.size(); ++i) {
+            const uint32_t name = member_[i].first;
+            if (sum.count(name) || homes.count(name)) continue;
+            tree.nearest(few_[i], 1, found);
+            homes[name] = label_at(decoded.positions[label[found[0].vertex]]);
+        }
+        return homes;
     }
 
     const SurfaceFrame& frame_;
