@@ -80,4 +80,7 @@ struct SurfaceFrame {
 /// patch and turns the normal. False where fewer than 4 vertices carry it (nothing there).
 bool settle(const SurfaceFrame& frame, float radius, SurfacePoint& point);
 
+/// How deep x lies in the source's liquid, metres; negative: in the air. 0 farther than `most` from its surface.
+float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most);
+
 }  // namespace rill::cooker

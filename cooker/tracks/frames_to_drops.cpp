@@ -7,8 +7,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "tracks/decoded_frame.h"
 #include "tracks/pipeline.h"
-#include "tracks/points_to_mesh.h"
 
 namespace rill::cooker {
 namespace {
@@ -222,16 +222,14 @@ std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance) {
     return drops;
 }
 
-std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, float tolerance) {
+std::vector<Drop> lost_drops(const SurfaceFrame& frame, const DecodedFrame& decoded, float beyond, float tolerance) {
     std::vector<Drop> drops;
     const std::vector<Piece> pieces = small_pieces(frame.mesh, label_components(frame.mesh), frame.edge);
     if (pieces.empty()) return drops;
-    const Mesh decoded = points.empty() ? Mesh{} : mesh_points(points, frame.edge, 1, frame.mesh.positions.size());
-    const SurfaceIndex index(decoded);
     for (const Piece& piece : pieces) {
         std::vector<glm::vec3> positions;
         for (uint32_t v : vertices_of(frame.mesh, piece.triangles)) positions.push_back(frame.mesh.positions[v]);
-        if (!decoded.triangles.empty() && 2 * find_beyond(index, positions, beyond, 1).size() < positions.size()) continue;
+        if (!decoded.mesh.triangles.empty() && 2 * find_beyond(decoded.pieces.index, positions, beyond, 1).size() < positions.size()) continue;
         const Fit any{INFINITY, INFINITY, 0, least_radius(frame.edge, tolerance)};
         if (const auto drop = fit_drop(frame.mesh, piece.triangles, piece.moments, any)) drops.push_back(*drop);
     }

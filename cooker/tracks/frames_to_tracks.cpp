@@ -7,6 +7,7 @@
 
 #include "common/parallel.h"
 #include "frames/walls.h"
+#include "tracks/decoded_frame.h"
 #include "tracks/mean_depth.h"
 #include "tracks/points_to_mesh.h"
 
@@ -284,16 +285,17 @@ std::vector<uint32_t> trim_strays(Window& window, const CodedWindow& coded, cons
     return trimmed;
 }
 
-/// Of every sample: those taken out of its mesh, what coded points do not show, and the necks that they do not hold.
+/// Of every sample: those taken out of its mesh, what coded points do not show, and the necks and fingers that they do not.
 std::vector<std::vector<Drop>> drops_of(const Window& window, const CodedWindow& coded, const WindowGoal& goal) {
     std::vector<std::vector<Drop>> drops(window.frames.size());
     parallel_for(drops.size(), goal.jobs, [&](size_t s) {
         const SurfaceFrame& frame = *window.frames[s];
-        const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s));
-        drops[s] = lost_drops(frame, points, repair_beyond * goal.tolerance, goal.tolerance);
-        const std::vector<Drop> necks = neck_drops(frame, points);
-        drops[s].insert(drops[s].end(), necks.begin(), necks.end());
-        drops[s].insert(drops[s].begin(), frame.drops.begin(), frame.drops.end());
+        const DecodedFrame decoded(frame, decoded_points(coded.decoded, int(s)));
+        const auto add = [&](const std::vector<Drop>& more) { drops[s].insert(drops[s].end(), more.begin(), more.end()); };
+        add(frame.drops);
+        add(lost_drops(frame, decoded, repair_beyond * goal.tolerance, goal.tolerance));
+        add(neck_drops(frame, decoded));
+        add(spur_drops(frame, decoded, drops[s]));
     });
     return drops;
 }

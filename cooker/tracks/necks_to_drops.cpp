@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Necks that no point mends (points_to_repairs.cpp): thinner than half an edge, the source's mesher drew them, but corners of the runtime's
-// cells hardly ever lie in them. A small ellipsoid from one side to the other holds what hangs on them in that frame.
+// Necks that no point mends (points_to_repairs.cpp), of liquid or of the air between two pieces: thinner than half an edge, the source's
+// mesher drew them, but corners of the runtime's cells hardly ever lie in them. A small ellipsoid of liquid from one side to the other holds
+// what hangs on a neck in that frame; one of air, flat as the gap is, parts what ran together.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
-#include "surface/field_to_mesh.h"
+#include "tracks/decoded_frame.h"
+#include "tracks/drop_shape.h"
 #include "tracks/pipeline.h"
-#include "tracks/points_to_mesh.h"
-#include "tracks/torn_necks.h"
 
 namespace rill::cooker {
 namespace {
@@ -18,55 +17,32 @@ constexpr float longest_gap = 3;                    // farther apart, it is no n
 constexpr float radii[] = {0.45f, 0.6f, 0.75f, 0.9f};  // across it, the first that holds; drawn larger, for it touches both sides
 constexpr float leans[] = {0, 0.5f};                // of the way to the nearest corner of the cells; a strand just between them would take twice as wide a drop
 constexpr float overlap = 0.6f;                     // into either side
-constexpr float coded_off = 0.1f;                   // as much thinner it still has to hold
-constexpr float apart = 0.8f;                       // from other liquid
+constexpr float coded_off = 0.1f;                   // as much thinner it still has to mend
 constexpr float around_neck = 3;                    // corners that are looked at
+constexpr float widths[] = {0.75f, 1, 1.5f, 2, 2.5f};  // radii of a disc of air; its half height is one of `radii`
+constexpr float disc_leans[] = {0, 0.4f, 0.8f};      // of the way to the nearest corner
+constexpr float sample_apart = 0.25f;                // in a disc
+constexpr float widest_gap = 1;                     // corners of cells lie in wider ones
+constexpr float behind_gap = 0.6f, least_behind = 0.3f;  // so far beyond the air is liquid, so deep: it opens no thin sheet
 
-/// The vertex of a decoded piece that is nearest to x.
-glm::vec3 nearest_of(const MeshPieces& decoded, uint32_t piece, const glm::vec3& x) {
+/// The vertex of a piece that is nearest to x.
+glm::vec3 nearest_of(const MeshPieces& pieces, uint32_t piece, const glm::vec3& x) {
     glm::vec3 best(INFINITY);
-    for (uint32_t v = 0; v < decoded.label.size(); ++v)
-        if (decoded.label[v] == piece && glm::distance(decoded.mesh.positions[v], x) < glm::distance(best, x)) best = decoded.mesh.positions[v];
+    for (uint32_t v = 0; v < pieces.label.size(); ++v)
+        if (pieces.label[v] == piece && glm::distance(pieces.mesh.positions[v], x) < glm::distance(best, x)) best = pieces.mesh.positions[v];
     return best;
 }
 
-/// A spindle of revolution: half axes along and across.
-struct Spindle {
-    glm::vec3 centre, axis;
-    float along, across;
-    float value(const glm::vec3& x) const {
-        const glm::vec3 r = x - centre;
-        const float up = glm::dot(r, axis) / along, out = glm::length(r - axis * glm::dot(r, axis)) / across;
-        return (std::sqrt(up * up + out * out) - 1) * across;
-    }
-    /// As cells draw it, and as much thinner.
-    void draw(float edge, float thinner) {
-        const float scale = 1 + most_growth_of_drops * edge / std::cbrt(along * across * across);
-        along = scale * along - thinner, across = scale * across - thinner;
-    }
-    Drop drop() const {
-        const glm::mat3 m = glm::mat3(across) + (along - across) * glm::outerProduct(axis, axis);
-        Drop drop;
-        drop.centre = centre;
-        drop.shape = {m[0][0], m[1][1], m[2][2], m[0][1], m[0][2], m[1][2]};
-        drop.volume = 4 * std::numbers::pi_v<float> / 3 * along * across * across;
-        return drop;
-    }
-};
-
-/// Whether nothing but that piece of the source is near the spindle: it must not join what is apart.
-bool is_alone(const Spindle& spindle, uint32_t piece, const SurfaceFrame& frame, const std::vector<uint32_t>& label) {
-    std::vector<VertexTree::Found> found;
-    frame.tree.within(spindle.centre, spindle.along + apart * frame.edge, found);
-    return std::all_of(found.begin(), found.end(), [&](const auto& f) {
-        return label[f.vertex] == piece || spindle.value(frame.mesh.positions[f.vertex]) > apart * frame.edge;
-    });
+/// The field at corners with a disc of air cut out.
+std::vector<float> with_air(std::vector<float> value, const DropShape& disc, const NeckCorners& corners) {
+    for (size_t i = 0; i < value.size(); ++i) value[i] = std::max(value[i], -disc.value({corners.x[i], corners.y[i], corners.z[i]}));
+    return value;
 }
 
 /// What holds the neck; nothing where none of the radii does. The thinnest where no corner of cells is near enough to tell.
 /// `label`: of the source's vertices.
-std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const TornNeck& neck, const MeshPieces& decoded, const PointField& field) {
-    const glm::vec3 from = nearest_of(decoded, neck.pieces[0], neck.middle), to = nearest_of(decoded, neck.pieces[1], neck.middle);
+std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>& label, const TornNeck& neck, const DecodedFrame& decoded) {
+    const glm::vec3 from = nearest_of(decoded.pieces, neck.pieces[0], neck.middle), to = nearest_of(decoded.pieces, neck.pieces[1], neck.middle);
     const float gap = glm::distance(from, to), edge = frame.edge;
     if (!(gap < longest_gap * edge)) return {};
     std::vector<VertexTree::Found> found;
@@ -76,43 +52,87 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
     };
     const uint32_t piece = piece_at(neck.middle);
     if (piece_at(from) != piece || piece_at(to) != piece) return {};
-    const NeckCorners corners(neck, edge, around_neck * edge, decoded);
-    const std::vector<float> torn = field.values_at(corners.x, corners.y, corners.z);
+    const NeckCorners corners(neck, edge, around_neck * edge, decoded.pieces);
+    const std::vector<float> torn = decoded.field.values_at(corners.x, corners.y, corners.z);
     const glm::vec3 middle = 0.5f * (from + to), axis = gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1);
     const glm::vec3 corner = edge * glm::round(middle / edge) - middle, aside = corner - glm::dot(corner, axis) * axis;
     for (const float lean : leans)
         for (const float radius : radii) {
-            Spindle spindle{middle + lean * aside, axis, std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge};
+            const DropShape spindle = DropShape::spindle(middle + lean * aside, axis, std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge);
             if (!is_alone(spindle, piece, frame, label)) return {};
-            const Drop drop = spindle.drop();
-            spindle.draw(edge, coded_off * edge);
+            const DropShape drawn = spindle.drawn(edge, coded_off * edge);
             std::vector<float> held = torn;
-            for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], spindle.value({corners.x[i], corners.y[i], corners.z[i]}));
-            if (!corners.is_amiss(held, torn)) return drop;
+            for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], drawn.value({corners.x[i], corners.y[i], corners.z[i]}));
+            if (!corners.is_amiss(held, torn)) return spindle.drop(true);
         }
     return {};
 }
 
-}  // namespace
+/// Integral of the depth of the source's liquid in a disc of air, edges⁴.
+double cut_by(const DropShape& disc, const SurfaceFrame& frame) {
+    const int reach = int(std::ceil(disc.half.y / (sample_apart * frame.edge)));
+    double sum = 0;
+    for (int k = -reach; k <= reach; ++k)
+        for (int j = -reach; j <= reach; ++j)
+            for (int i = -reach; i <= reach; ++i) {
+                const glm::vec3 x = disc.centre + sample_apart * frame.edge * (disc.axes * glm::vec3(k, i, j));
+                if (disc.value(x) < 0) sum += std::max(depth_at(frame, x, INFINITY) / frame.edge, 0.f);
+            }
+    return sum * std::pow(sample_apart, 3);
+}
 
-std::vector<Drop> neck_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points) {
-    std::vector<Drop> drops;
-    if (points.empty()) return drops;
-    const PointField field(points);
-    const Mesh mesh = mesh_points(points, frame.edge, 1, frame.mesh.positions.size());
-    const MeshPieces decoded(mesh, 1);
-    const MeshPieces source(frame);
+/// The disc of air that parts two pieces of the source that run together there in the field as it is at those corners, and takes
+/// least of them; nothing where none does.
+std::optional<DropShape> part(const SurfaceFrame& frame, const MeshPieces& source, const TornNeck& neck, const NeckCorners& corners, const std::vector<float>& joined) {
+    const glm::vec3 to = nearest_of(source, neck.pieces[1], nearest_of(source, neck.pieces[0], neck.middle)), from = nearest_of(source, neck.pieces[0], to);
+    const float gap = glm::distance(from, to), edge = frame.edge;
+    if (!(gap > 0 && gap < widest_gap * edge)) return {};
+    const glm::vec3 middle = 0.5f * (from + to), axis = (to - from) / gap;
+    const glm::vec3 corner = edge * glm::round(middle / edge) - middle;
+    std::optional<DropShape> best;
+    double least = INFINITY;
+    for (const float lean : disc_leans)
+        for (const float width : widths)
+            for (const float height : radii) {
+                const DropShape disc = DropShape::spindle(middle + lean * corner, axis, height * edge, width * edge), drawn = disc.drawn(edge, 0);
+                if (corners.is_amiss(with_air(joined, disc.drawn(edge, coded_off * edge), corners), joined)) continue;
+                const glm::vec3 behind = (drawn.half.x + behind_gap * edge) * axis;
+                if (std::min(depth_at(frame, disc.centre - behind, INFINITY), depth_at(frame, disc.centre + behind, INFINITY)) < least_behind * edge) continue;
+                if (const double cut = cut_by(drawn, frame); cut < least) least = cut, best = disc;
+            }
+    return best;
+}
+
+/// Spindles of liquid where a piece of the source has been torn.
+void hold_pieces(const SurfaceFrame& frame, const MeshPieces& source, const DecodedFrame& decoded, std::vector<Drop>& drops) {
     std::vector<std::array<uint32_t, 2>> held;
-    std::vector<VertexTree::Found> found;
-    for (const TornNeck& neck : find_torn_necks(source, decoded, frame.edge)) {
+    for (const TornNeck& neck : find_torn_necks(source, decoded.pieces, frame.edge)) {
         if (neck.of != TornNeck::Of::liquid) continue;  // a bubble as thin would hardly hold a corner
         if (std::find(held.begin(), held.end(), neck.pieces) != held.end()) continue;
-        std::optional<Drop> drop = hold(frame, source.label, neck, decoded, field);
-        if (!drop) continue;
-        frame.tree.nearest(neck.middle, 1, found);
-        if (!frame.mesh.velocities.empty()) drop->velocity = frame.mesh.velocities[found[0].vertex];
-        drops.push_back(*drop), held.push_back(neck.pieces);
+        if (const auto drop = hold(frame, source.label, neck, decoded)) drops.push_back(*drop), held.push_back(neck.pieces), set_velocity(frame, drops.back());
     }
+}
+
+/// Discs of air where pieces of the source have run together.
+void part_pieces(const SurfaceFrame& frame, const MeshPieces& source, const DecodedFrame& decoded, std::vector<Drop>& drops) {
+    std::vector<DropShape> parted;
+    for (const TornNeck& neck : find_false_necks(source, decoded.pieces, frame.edge)) {
+        const NeckCorners corners(neck, frame.edge, around_neck * frame.edge, source);
+        std::vector<float> joined = decoded.field.values_at(corners.x, corners.y, corners.z);
+        for (const DropShape& disc : parted) joined = with_air(joined, disc.drawn(frame.edge, coded_off * frame.edge), corners);
+        if (!corners.is_amiss(joined, joined)) continue;
+        const std::optional<DropShape> disc = part(frame, source, neck, corners, joined);
+        if (disc) parted.push_back(*disc), drops.push_back(disc->drop(false)), set_velocity(frame, drops.back());
+    }
+}
+
+}  // namespace
+
+std::vector<Drop> neck_drops(const SurfaceFrame& frame, const DecodedFrame& decoded) {
+    std::vector<Drop> drops;
+    if (decoded.mesh.triangles.empty()) return drops;
+    const MeshPieces source(frame);
+    hold_pieces(frame, source, decoded, drops), part_pieces(frame, source, decoded, drops);
     return drops;
 }
 

@@ -13,7 +13,8 @@
 //   asset/tracks_to_coefficients  Fourier extensions on a quantiser's lattice (layers_to_chunks.h)
 //   refit_tracks                  coefficients chosen anew, against the surface that all tracks decode to together
 //   refit_volume                  heights of the points of small pieces go by a step, until the volume is the source's
-//   necks_to_drops                necks that are torn for all that are held by drops
+//   necks_to_drops                necks that are torn for all that are held by drops, and pieces parted
+//   spurs_to_drops                fingers that are lost, or false, likewise
 //   coefficients_to_layers        progressive order, blocks
 //   asset/layers_to_chunks        entropy coding
 //   asset/chunks_to_asset         the file
@@ -31,6 +32,8 @@ namespace rill::cooker {
 /// Why a track ends before its window does.
 enum class Death { none, left_surface, crowded, surplus };
 inline constexpr const char* death_names[] = {"span_ends", "left_surface", "crowded", "surplus"};
+
+struct DecodedFrame;
 
 /// One track while it is made: samples birth … death of its window.
 struct Path {
@@ -66,9 +69,11 @@ struct Window {
 std::vector<Drop> take_drops(Mesh& mesh, float edge, float tolerance);
 /// Other small closed pieces of a frame, which its points, as decoded, do not show: most of it is more than `beyond` metres from what
 /// they do. As ellipsoids, however far those are off, no thinner than can be coded within `tolerance` and seen.
-std::vector<Drop> lost_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points, float beyond, float tolerance);
-/// What hangs on a neck of the source, but not as decoded, is held by a drop.
-std::vector<Drop> neck_drops(const SurfaceFrame& frame, const std::vector<SurfacePoint>& points);
+std::vector<Drop> lost_drops(const SurfaceFrame& frame, const DecodedFrame& decoded, float beyond, float tolerance);
+/// What hangs on a neck of the source, but not as decoded, is held by a drop; pieces that ran together are parted by one of air.
+std::vector<Drop> neck_drops(const SurfaceFrame& frame, const DecodedFrame& decoded);
+/// Fingers and pits of the source that are lost, and decoded ones that are false, by drops of what is right there. `shown`: by drops already.
+std::vector<Drop> spur_drops(const SurfaceFrame& frame, const DecodedFrame& decoded, const std::vector<Drop>& shown);
 /// Tracks of the drops of every sample of the window. Those at its first and last go on in the windows beside it, which see the same
 /// frame.
 std::vector<TrackSamples> track_drops(const Window& window, const std::vector<std::vector<Drop>>& drops);

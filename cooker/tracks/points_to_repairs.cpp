@@ -80,14 +80,6 @@ std::vector<OffSurface> find_off(const SurfaceFrame& frame, const Mesh& decoded,
     return off;
 }
 
-/// How deep x lies in the source's liquid, metres; negative: in the air. 0 farther than `most` from its surface.
-float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most) {
-    const SurfaceIndex::Hit hit = frame.index.closest(x, most);
-    if (!(hit.distance < most)) return 0;
-    const Triangle& t = frame.mesh.triangles[hit.triangle];
-    return glm::dot(value_at(hit, t, frame.mesh.normals), x - hit.point) > 0 ? -hit.distance : hit.distance;
-}
-
 /// A torn place: probes in it whose side is known, and points that could be born there.
 struct Place {
     glm::vec3 centre;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr float least_seen = 0.1f;   // of a cell: a radius below is nothing that can be seen
 constexpr float largest = 2.2f;      // likewise, root mean square of the half axes: what has a mesh of its own (1.4: pieces of 8 to 15 cubic cells 1.2 % smaller)
-constexpr float least_gap = 0.25f;   // cells beyond the drop, where nothing else may be as near
+constexpr float least_gap = 0.05f;   // cells beyond the drop, where nothing else may be as near
 constexpr float same_value = 1e-3f;  // cells
 constexpr float sight_margin = 4;    // cells round it: those on the border of sight may be made of it
 // Cells cut that share off the volume of an ellipsoid, over the square of its mean radius in cells: .62 (large balls) to .67 (pancakes), less
