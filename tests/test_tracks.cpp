@@ -379,6 +379,28 @@ TEST_CASE("small pieces of points have their volume, too, beside a large one tha
     CHECK(volumes()[0] == doctest::Approx(large).epsilon(1e-5));
 }
 
+TEST_CASE("pieces that are a third of their frame each have its volume, not only about their own") {
+    Window window = standing_ball();
+    const float edge = window.frames[0]->edge;
+    Mesh three;
+    for (int k = 0; k < 3; ++k) append(three, sphere(24, 5 * edge, {1.2f * float(k), 0.01f * float(k), 0}, 0.3f));
+    const auto frame = std::make_shared<const SurfaceFrame>(three, edge);
+    for (auto& motion : window.motion) motion.assign(three.positions.size(), glm::vec3(0));
+    std::fill(window.frames.begin(), window.frames.end(), frame);
+    const WindowGoal goal = goal_of(window);
+    grow_tracks(window, {}, goal);
+    CodedWindow coded = code_tracks(window, goal, tables());
+    for (size_t i = 0; i < coded.tracks.size(); i += 4) {
+        coded.tracks[i].position[2] -= 2;
+        coded.decoded[i] = dequantise_track(coded.tracks[i], coded.quantiser, goal.origin, tables());
+    }
+    const auto volume = [&] { return signed_volume(mesh_points(decoded_points(coded.decoded, 5), edge)) / signed_volume(frame->mesh); };
+    REQUIRE(volume() > 0.97);
+    REQUIRE(volume() < 0.99);
+    refit_volume(window, coded, goal, tables());
+    CHECK(std::fabs(volume() - 1) < 0.006);
+}
+
 TEST_CASE("pieces that have run into one keep their volume: it is not one's alone") {
     Window window = standing_ball();
     const float edge = window.frames[0]->edge;

@@ -21,8 +21,8 @@ namespace {
 
 constexpr size_t few_points = 1000;   // of a piece; frames of more are within .2 % by themselves,
 constexpr double thin = 2;            // unless they have fewer cubic edges of volume to a square edge of surface
-// Off by less is near enough, of the volume of a piece that is most of its frame's, and of others. A step of one point of a droplet
-// is as much.
+// Off by less is near enough, of the volume of a piece that is most of its frame's, and of small ones; in between by its share, so that two
+// jets that have just begun have their frame's volume. A step of one point of a droplet is as much as the second.
 constexpr double near_main = 2.5e-3, near_other = 0.03;
 constexpr double nearest = 0.5;       // of the largest step
 constexpr double most_missing = 0.5;  // else the piece is torn, or one with another
@@ -79,7 +79,7 @@ private:
             const uint32_t name = piece_[i];
             if (is_exact(name) || !(volume[name] > 0)) continue;
             Piece& piece = pieces[name];
-            piece.volume = volume[name], piece.near = 2 * volume[name] > all ? near_main : near_other;
+            piece.volume = volume[name], piece.near = std::clamp(near_main * all / (2 * volume[name]), near_main, near_other);
             const SurfaceIndex::Hit hit = frame_.index.closest(points_[i].position, INFINITY);
             piece.members.push_back({ids[i], 0, glm::dot(hit.point - points_[i].position, points_[i].normal)});
             few_.push_back(points_[i].position), member_.emplace_back(name, uint32_t(piece.members.size() - 1));
