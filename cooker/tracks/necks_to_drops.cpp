@@ -13,17 +13,19 @@ namespace rill::cooker {
 namespace {
 
 // Edges.
-constexpr float longest_gap = 3;                    // farther apart, it is no neck
-constexpr float radii[] = {0.45f, 0.6f, 0.75f, 0.9f};  // across it, the first that holds; drawn larger, for it touches both sides
-constexpr float leans[] = {0, 0.5f};                // of the way to the nearest corner of the cells; a strand just between them would take twice as wide a drop
-constexpr float overlap = 0.6f;                     // into either side
-constexpr float coded_off = 0.1f;                   // as much thinner it still has to mend
-constexpr float around_neck = 3;                    // corners that are looked at
-constexpr float widths[] = {0.75f, 1, 1.5f, 2, 2.5f};  // radii of a disc of air; its half height is one of `radii`
-constexpr float disc_leans[] = {0, 0.4f, 0.8f};      // of the way to the nearest corner
-constexpr float sample_apart = 0.25f;                // in a disc
-constexpr float widest_gap = 1;                     // corners of cells lie in wider ones
+constexpr float radii[] = {0.45f, 0.6f, 0.75f, 0.9f};    // of a spindle across its neck, the first that holds; half the height of a disc
+constexpr float coded_off = 0.1f;                        // as much thinner it still has to mend
+constexpr float around_neck = 3;                         // corners that are looked at
+// Of spindles of liquid.
+constexpr float longest_gap = 3;                         // farther apart, it is no neck
+constexpr float leans[] = {0, 0.5f};                     // of the way to the nearest corner; a strand just between them would take twice as wide a drop
+constexpr float overlap = 0.6f;                          // into either side
+// Of discs of air.
+constexpr float widest_gap = 1;                          // corners of cells lie in wider ones
+constexpr float widths[] = {0.75f, 1, 1.5f, 2, 2.5f};    // radii
+constexpr float disc_leans[] = {0, 0.4f, 0.8f};          // of the way to the nearest corner
 constexpr float behind_gap = 0.6f, least_behind = 0.3f;  // so far beyond the air is liquid, so deep: it opens no thin sheet
+constexpr float samples_apart = 0.25f;
 
 /// The vertex of a piece that is nearest to x.
 glm::vec3 nearest_of(const MeshPieces& pieces, uint32_t piece, const glm::vec3& x) {
@@ -70,15 +72,15 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
 
 /// Integral of the depth of the source's liquid in a disc of air, edges⁴.
 double cut_by(const DropShape& disc, const SurfaceFrame& frame) {
-    const int reach = int(std::ceil(disc.half.y / (sample_apart * frame.edge)));
+    const int reach = int(std::ceil(disc.half.y / (samples_apart * frame.edge)));
     double sum = 0;
     for (int k = -reach; k <= reach; ++k)
         for (int j = -reach; j <= reach; ++j)
             for (int i = -reach; i <= reach; ++i) {
-                const glm::vec3 x = disc.centre + sample_apart * frame.edge * (disc.axes * glm::vec3(k, i, j));
+                const glm::vec3 x = disc.centre + samples_apart * frame.edge * (disc.axes * glm::vec3(k, i, j));
                 if (disc.value(x) < 0) sum += std::max(depth_at(frame, x, INFINITY) / frame.edge, 0.f);
             }
-    return sum * std::pow(sample_apart, 3);
+    return sum * std::pow(samples_apart, 3);
 }
 
 /// The disc of air that parts two pieces of the source that run together there in the field as it is at those corners, and takes
