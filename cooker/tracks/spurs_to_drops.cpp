@@ -135,26 +135,16 @@ public:
     }
     /// Whether cells show the tip, and as one with what is decoded of its piece, if that drop is of liquid.
     bool is_shown(const DropShape& drop) const {
+        const auto is_liquid = [&](size_t i) { return corners_.value[i] < 0 || drop.value(corners_.at(i)) < 0; };
+        std::vector<size_t> tip;
+        for (size_t i = 0; i < corners_.value.size(); ++i)
+            if (drop.value(corners_.at(i)) < 0 && glm::distance(corners_.at(i), spur_.tip) < tip_shown * edge_) tip.push_back(i);
         std::vector<bool> reached(corners_.value.size(), false);
-        std::vector<size_t> next;
-        for (size_t i = 0; i < reached.size(); ++i)
-            if (drop.value(corners_.at(i)) < 0 && glm::distance(corners_.at(i), spur_.tip) < tip_shown * edge_) reached[i] = true, next.push_back(i);
-        const int step[3] = {1, corners_.size.x, corners_.size.x * corners_.size.y};
-        while (!next.empty()) {
-            const size_t at = next.back();
-            next.pop_back();
-            const bool is_in_drop = drop.value(corners_.at(at)) < 0;
-            if (!is_in_drop && corners_.value[at] < 0) return source_.nearest(corners_.at(at)) == piece_;
-            for (int a = 0; a < 3; ++a)
-                for (const int way : {-1, 1}) {
-                    const int place = int(at) / step[a] % corners_.size[a] + way;
-                    if (place < 0 || place >= corners_.size[a]) continue;
-                    const size_t to = size_t(int(at) + way * step[a]);
-                    if (reached[to] || !(corners_.value[to] < 0 || drop.value(corners_.at(to)) < 0)) continue;
-                    reached[to] = true, next.push_back(to);
-                }
-        }
-        return false;
+        bool joins = false;
+        flood(tip, is_liquid, reached, [&](size_t i) {
+            joins = joins || (corners_.value[i] < 0 && !(drop.value(corners_.at(i)) < 0) && source_.nearest(corners_.at(i)) == piece_);
+        });
+        return joins;
     }
     /// Whether the spur is gone, if that drop is of air.
     bool is_gone(const DropShape& drop) const {
@@ -167,10 +157,35 @@ public:
             if (!(drop.value(x) < 0)) return false;
             any = true;
         }
-        return any;
+        return any && pieces_without(&drop) <= pieces_without(nullptr);  // a strand decoded aside of its place is not torn for that
     }
 
 private:
+    /// Calls visit(corner) with those that hang together with `next` in the liquid, once each.
+    template <typename IsLiquid, typename Visit>
+    void flood(std::vector<size_t> next, IsLiquid is_liquid, std::vector<bool>& reached, Visit visit) const {
+        for (const size_t i : next) reached[i] = true;
+        const int step[3] = {1, corners_.size.x, corners_.size.x * corners_.size.y};
+        while (!next.empty()) {
+            const size_t at = next.back();
+            next.pop_back(), visit(at);
+            for (int a = 0; a < 3; ++a)
+                for (const int way : {-1, 1}) {
+                    const int place = int(at) / step[a] % corners_.size[a] + way;
+                    const size_t to = size_t(int(at) + way * step[a]);
+                    if (place >= 0 && place < corners_.size[a] && !reached[to] && is_liquid(to)) reached[to] = true, next.push_back(to);
+                }
+        }
+    }
+    /// How many pieces of liquid are decoded here, but for a drop of air.
+    size_t pieces_without(const DropShape* air) const {
+        const auto is_liquid = [&](size_t i) { return corners_.value[i] < 0 && !(air && air->value(corners_.at(i)) < 0); };
+        std::vector<bool> reached(corners_.value.size(), false);
+        size_t pieces = 0;
+        for (size_t i = 0; i < reached.size(); ++i)
+            if (!reached[i] && is_liquid(i)) ++pieces, flood({i}, is_liquid, reached, [](size_t) {});
+        return pieces;
+    }
     const Spur& spur_;
     const MeshPieces& source_;
     uint32_t piece_;
