@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <optional>
 
 #include "tracks/decoded_frame.h"
@@ -42,32 +41,25 @@ struct Spur {
 void find_spurs(const Mesh& mesh, const SurfaceIndex& other, float edge, std::vector<Spur>& spurs) {
     const std::vector<uint32_t> beyond = find_beyond(other, mesh.positions, least_off * edge, 1);
     if (beyond.empty()) return;
-    constexpr uint32_t none = ~0u;
-    std::vector<uint32_t> name(mesh.positions.size(), none);
-    for (uint32_t v : beyond) name[v] = v;
-    const auto root = [&](uint32_t v) {
-        while (name[v] != v) v = name[v] = name[name[v]];
-        return v;
-    };
+    std::vector<bool> is_off(mesh.positions.size(), false);
+    for (uint32_t v : beyond) is_off[v] = true;
+    Mesh off{mesh.positions, {}, {}, {}};
     for (const Triangle& t : mesh.triangles)
-        for (int k = 0; k < 3; ++k) {
-            const uint32_t a = t[size_t(k)], b = t[size_t(k + 1) % 3];
-            if (name[a] == none || name[b] == none) continue;
-            const uint32_t one = root(a), two = root(b);
-            name[std::max(one, two)] = std::min(one, two);
-        }
+        for (size_t k = 0; k < 3; ++k)
+            if (const uint32_t a = t[k], b = t[(k + 1) % 3]; is_off[a] && is_off[b]) off.triangles.push_back({a, b, a});  // an edge
+    const std::vector<uint32_t> label = label_components(off);
     std::map<uint32_t, Spur> found;
     for (uint32_t v : beyond) {
-        Spur& spur = found[root(v)];
+        Spur& spur = found[label[v]];
         const glm::vec3& x = mesh.positions[v];
         spur.positions.push_back(x);
-        if (const float off = other.closest(x, INFINITY).distance; off > spur.off) spur.off = off, spur.tip = x;
+        if (const float away = other.closest(x, INFINITY).distance; away > spur.off) spur.off = away, spur.tip = x;
     }
-    for (auto& [first, spur] : found)
+    for (auto& [name, spur] : found)
         if (spur.off > far_off * edge) spurs.push_back(std::move(spur));
 }
 
-/// The ellipsoid in the spur's box along its principal axes, the tip's end of the first first.
+/// The ellipsoid in the spur's box along its principal axes.
 DropShape box_of(const Spur& spur) {
     glm::vec3 mean(0);
     for (const glm::vec3& x : spur.positions) mean += x / float(spur.positions.size());
@@ -101,7 +93,7 @@ DropShape stretched(DropShape shape, const glm::vec3& tip, const Stretch& by, fl
 
 /// Places on a lattice round a spur: how deep in the source's liquid, and what is decoded.
 struct Lattice {
-    Lattice(const SurfaceFrame& frame, const DecodedFrame& decoded, const Spur& spur, float cell_, float phase) : cell(cell_) {
+    Lattice(const SurfaceFrame& frame, const DecodedFrame& decoded, const Spur& spur, float cell, float phase) {
         glm::vec3 lower(INFINITY), upper(-INFINITY);
         for (const glm::vec3& x : spur.positions) lower = glm::min(lower, x), upper = glm::max(upper, x);
         const glm::vec3 first = glm::floor((lower - around_spur * frame.edge) / cell);
@@ -115,15 +107,15 @@ struct Lattice {
         value = decoded.field.values_at(x, y, z);
     }
     glm::vec3 at(size_t i) const { return {x[i], y[i], z[i]}; }
-    float cell;
     glm::ivec3 size;
     std::vector<float> x, y, z, depth, value;
 };
 
+/// Fine samples and the corners of cells round a spur, and what a drop there would do to them.
 class Surroundings {
 public:
-    Surroundings(const SurfaceFrame& frame, const MeshPieces& source, const DecodedFrame& decoded, const Spur& spur)
-        : spur_(spur), source_(source), piece_(source.nearest(spur.tip)), edge_(frame.edge), samples_(frame, decoded, spur, samples_apart * frame.edge, 0.5f), corners_(frame, decoded, spur, frame.edge, 0) {}
+    Surroundings(const SurfaceFrame& frame, const MeshPieces& source, uint32_t piece, const DecodedFrame& decoded, const Spur& spur)
+        : spur_(spur), source_(source), piece_(piece), edge_(frame.edge), samples_(frame, decoded, spur, samples_apart * frame.edge, 0.5f), corners_(frame, decoded, spur, frame.edge, 0) {}
     /// ∫ depth of liquid and air that are decoded as the other, with one more drop if any: edges⁴.
     double confused(const DropShape* more, bool is_liquid) const {
         double sum = 0;
@@ -196,9 +188,9 @@ private:
 std::optional<Drop> mend(const SurfaceFrame& frame, const MeshPieces& source, const DecodedFrame& decoded, const Spur& spur) {
     const DropShape box = box_of(spur);
     if (std::max({box.half.x, box.half.y, box.half.z}) > 0.5f * longest * frame.edge) return {};
-    const Surroundings around(frame, source, decoded, spur);
-    const bool is_liquid = depth_at(frame, box.centre, INFINITY) > 0;
     const uint32_t piece = source.nearest(spur.tip);
+    const Surroundings around(frame, source, piece, decoded, spur);
+    const bool is_liquid = depth_at(frame, box.centre, INFINITY) > 0;
     std::optional<DropShape> best;
     double least = around.confused(nullptr, is_liquid) + (is_liquid ? most_spoilt : 0);
     for (const float lean : leans) {
