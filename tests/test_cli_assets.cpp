@@ -163,8 +163,13 @@ TEST_CASE("bench: no allocation in frames, one output whatever the order and the
     CHECK(json["allocations_in_frames"] == 0);
     CHECK(json["output_identical"] == true);
     CHECK(json["passes"].size() == 10);
-    CHECK(json["scaling"].size() == 2);
-    CHECK(json["draco"]["triangles_per_second"].get<double>() > 0);
+    REQUIRE(json["scaling"].size() == 2);
+    CHECK(json["scaling"][0]["speedup"] == 1);
+    CHECK(json["scaling"][1]["speedup"].get<double>() > 0);
+    CHECK(json["scaling"][1]["two_players_at_once"].get<double>() > 0);
+    const nlohmann::json& draco = json["draco"];
+    CHECK(draco["triangles_per_second"].get<double>() > 0);
+    CHECK(draco["rill_over_draco"].get<double>() == doctest::Approx(draco["mean_us"].get<double>() / draco["rill_mean_us"].get<double>()));
 }
 
 TEST_CASE("compare: Draco's size falls and its error grows with fewer bits") {

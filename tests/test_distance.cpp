@@ -50,6 +50,7 @@ TEST_CASE("closest point equals brute force, also on slivers and degenerate tria
         mesh.triangles.push_back({uint32_t(3 * i), uint32_t(3 * i + 1), uint32_t(3 * i + 2)});
     }
     const SurfaceIndex index(mesh);
+    SurfaceIndex::Near near, near_within;
     for (int i = 0; i < 2000; ++i) {
         const glm::vec3 x = 1.5f * glm::vec3(number(), number(), number());
         double expected = infinity;
@@ -66,6 +67,12 @@ TEST_CASE("closest point equals brute force, also on slivers and degenerate tria
         CHECK(index.closest(x, hit.distance * 1.01f).distance == hit.distance);
         CHECK(!index.within(x, hit.distance * 0.99f));
         CHECK(index.within(x, hit.distance * 1.01f));
+        // Wherever the query before it has ended:
+        REQUIRE(index.closest(x, infinity, &near).distance == hit.distance);
+        REQUIRE(near.leaf != SurfaceIndex::Near{}.leaf);
+        CHECK(index.closest(x, hit.distance * 0.99f, &near).distance == infinity);
+        CHECK(!index.within(x, hit.distance * 0.99f, &near_within));
+        CHECK(index.within(x, hit.distance * 1.01f, &near_within));
     }
 }
 

@@ -292,6 +292,40 @@ TEST_CASE("what hangs on a needle is held by a drop, and what does not hang toge
     }
 }
 
+TEST_CASE("air that hangs together by a needle is held by a drop of air, and bubbles that do not stay apart") {
+    constexpr float ball = 3, apart = 3.6f, pool = 14;
+    for (int k = 0; k < 6; ++k) {  // wherever cells lie
+        CAPTURE(k);
+        const glm::vec3 middle = edge * 0.17f * float(k) * glm::vec3(1, 2, 3);
+        Mesh air = dumbbell(edge, ball, 0.1f, apart), source = sphere(120, pool * edge, middle), two = source;
+        for (glm::vec3& x : air.positions) x += middle;
+        for (Triangle& t : air.triangles) std::swap(t[1], t[2]);
+        append(source, air);
+        std::vector<SurfacePoint> points;
+        for (const glm::vec3& x : sphere(48, pool * edge, middle).positions) points.push_back({x, glm::normalize(x - middle), {}});
+        for (const float side : {-1.f, 1.f}) {
+            const glm::vec3 centre = middle + glm::vec3(side * apart * edge, 0, 0);
+            Mesh bubble = sphere(40, ball * edge, centre);
+            for (Triangle& t : bubble.triangles) std::swap(t[1], t[2]);
+            append(two, bubble);
+            for (const glm::vec3& x : sphere(16, ball * edge, centre).positions) points.push_back({x, glm::normalize(centre - x), {}});
+        }
+        const SurfaceFrame whole(source, edge), torn(two, edge);
+        CHECK(neck_drops(torn, DecodedFrame(torn, points)).empty());
+        const std::vector<Drop> drops = neck_drops(whole, DecodedFrame(whole, points));
+        REQUIRE(drops.size() == 1);
+        CHECK(drops[0].volume < 0);
+        CHECK(glm::distance(drops[0].centre, middle) < edge);
+        mesh_test::Cloud cloud;
+        for (const SurfacePoint& p : points) cloud.add({p.position.x, p.position.y, p.position.z}, {p.normal.x, p.normal.y, p.normal.z});
+        CHECK(mesh_test::topology(mesh_test::mesh(mesh_test::RealField(cloud).field, {edge})).euler == 6);  // the pool and two bubbles
+        const glm::vec3& at = drops[0].centre;
+        const auto& shape = drops[0].shape;
+        cloud.add_drop({at.x, at.y, at.z}, {shape[0], shape[1], shape[2]});
+        CHECK(mesh_test::topology(mesh_test::mesh(mesh_test::RealField(cloud).field, {edge})).euler == 4);  // one
+    }
+}
+
 TEST_CASE("what runs together across a gap that no corner lies in is parted by a disc of air, and what does not stays whole") {
     constexpr float ball = 3, gap = 0.3f;
     int joined = 0;

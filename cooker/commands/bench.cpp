@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cstdio>
-#include <optional>
 #include <thread>
 
 #include "asset/asset_directory.h"
+#include "commands/bench_beside.h"
 #include "commands/bench_detail.h"
 #include "commands/commands.h"
-#include "readers/draco_mesh.h"
 
 namespace rill::cooker {
 namespace {
@@ -117,28 +116,6 @@ void print(const Pass& pass) {
                 static_cast<unsigned long long>(pass.hash));
 }
 
-/// Draco's decoder on what Rill itself shows, in processor time of one core.
-struct DracoRate {
-    double triangles = 0, seconds = 0, bytes = 0;
-    size_t frames = 0;
-};
-DracoRate draco_rate(BenchPlayer& player, const std::vector<uint32_t>& frames) {
-    constexpr size_t most = 16;
-    DracoRate rate;
-    const size_t count = std::min(most, frames.size());
-    for (size_t k = 0; k < count; ++k) {
-        Mesh mesh;
-        player.play(player.seconds_of(frames[frames.size() * k / count]), 0, &mesh);
-        if (mesh.triangles.empty()) continue;
-        const std::string bytes = draco_encode(mesh, 10, 10);
-        const uint64_t start = processor_microseconds();
-        const Mesh decoded = draco_decode(bytes, "Draco");
-        rate.seconds += 1e-6 * double(processor_microseconds() - start);
-        rate.triangles += double(decoded.triangles.size()), rate.bytes += double(bytes.size()), ++rate.frames;
-    }
-    return rate;
-}
-
 std::vector<uint32_t> frames_asked_for(const AssetDirectory& directory, const BenchOptions& options) {
     const FrameRange range = parse_frames(options.frames);
     std::vector<uint32_t> frames;
@@ -150,109 +127,147 @@ std::vector<uint32_t> frames_asked_for(const AssetDirectory& directory, const Be
     return frames;
 }
 
-int bench_command(const BenchOptions& options) {
-    const AssetDirectory directory = read_directory(options.asset);
-    const std::vector<uint32_t> frames = frames_asked_for(directory, options);
-    const int most_jobs = options.jobs > 0 ? options.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
-    std::vector<size_t> ahead = forward(frames.size()), back(ahead.rbegin(), ahead.rend());
-    std::vector<Pass> passes, details;
-    nlohmann::json memory;
+/// All that is measured.
+struct Report {
+    std::vector<Pass> passes;   ///< of the whole at full detail: cold and forward first, then the same with every number of workers
+    std::vector<Pass> details;  ///< less of it, or coarser
+    uint64_t allocations_until_created = 0, peak_bytes = 0, bytes_read = 0;
+    BesideDraco draco;
+    std::vector<SideBySide> scaling;  ///< by workers, from 1
+    double two_at_once = 0;
     std::vector<ScreenError> far;
     CameraJumps camera;
-    DracoRate draco;
-    double file_bytes = double(directory.header.file_bytes), bytes_read = 0;
-    for (int jobs = 1; jobs <= most_jobs; ++jobs) {
-        BenchPlayer player(options.asset, jobs);
-        const uint64_t at_start = player.allocations();
-        passes.push_back(run_pass(player, "cold", jobs, frames, ahead, 1));
-        bytes_read = double(player.bytes_read());
-        passes.push_back(run_pass(player, "forward", jobs, frames, ahead, 1));
-        if (jobs > 1) continue;
-        passes.push_back(run_pass(player, "backward", jobs, frames, back, -1));
-        passes.push_back(run_pass(player, "jumps", jobs, frames, jumps(frames.size()), 0));
-        for (int level = 1; level <= 3; ++level) {
-            player.look(player.info().cell_size * float(1 << level), false);
-            details.push_back(run_pass(player, "cells x" + std::to_string(1 << level), jobs, frames, ahead, 1));
-        }
-        player.look(0, true);
-        details.push_back(run_pass(player, "an eighth", jobs, frames, ahead, 1));
-        player.look(0, false);
-        memory = {{"allocations_until_created", at_start}, {"peak_bytes", player.peak_bytes()}};
-        draco = draco_rate(player, frames);
-        far = screen_errors(player, frames);
-        camera = camera_jumps(player, frames);
+
+    bool same() const {
+        return std::all_of(passes.begin(), passes.end(), [&](const Pass& pass) { return pass.hash == passes.front().hash; });
     }
-    bool same = true;
-    uint64_t frame_allocations = 0;
-    nlohmann::json list = nlohmann::json::array(), scaling = nlohmann::json::array();
-    for (const Pass& pass : passes) {
-        same = same && pass.hash == passes.front().hash;
-        frame_allocations += pass.frame_allocations;
-        list.push_back(to_json(pass));
-        if (pass.name == "forward")
-            scaling.push_back({{"jobs", pass.jobs},
-                               {"mean_us", pass.mean(stage_total)},
-                               {"speedup", pass.mean(stage_total) > 0 ? passes[1].mean(stage_total) / pass.mean(stage_total) : 0}});
+    uint64_t allocations_in_frames() const {
+        uint64_t sum = 0;
+        for (const auto* list : {&passes, &details})
+            for (const Pass& pass : *list) sum += pass.frame_allocations;
+        return sum;
     }
-    for (const Pass& pass : details) frame_allocations += pass.frame_allocations, list.push_back(to_json(pass));
-    nlohmann::json screen = nlohmann::json::array();
-    for (const ScreenError& e : far)
+};
+
+/// With one worker, who does everything.
+void measure_single(Report& report, BenchPlayer& player, const std::vector<uint32_t>& frames) {
+    const std::vector<size_t> ahead = forward(frames.size()), back(ahead.rbegin(), ahead.rend());
+    report.allocations_until_created = player.allocations();
+    report.passes.push_back(run_pass(player, "cold", 1, frames, ahead, 1));
+    report.bytes_read = player.bytes_read();
+    report.passes.push_back(run_pass(player, "forward", 1, frames, ahead, 1));
+    const double alone = report.passes.back().mean(stage_total);
+    report.scaling.push_back({alone, alone});
+    report.passes.push_back(run_pass(player, "backward", 1, frames, back, -1));
+    report.passes.push_back(run_pass(player, "jumps", 1, frames, jumps(frames.size()), 0));
+    for (int level = 1; level <= 3; ++level) {
+        player.look(player.info().cell_size * float(1 << level), false);
+        report.details.push_back(run_pass(player, "cells x" + std::to_string(1 << level), 1, frames, ahead, 1));
+    }
+    player.look(0, true);
+    report.details.push_back(run_pass(player, "an eighth", 1, frames, ahead, 1));
+    player.look(0, false);
+    report.peak_bytes = player.peak_bytes();
+    report.draco = beside_draco(player, frames);
+    report.far = screen_errors(player, frames);
+    report.camera = camera_jumps(player, frames);
+    player.look(0, false);
+}
+
+void measure_several(Report& report, BenchPlayer& single, const std::string& asset, int jobs, const std::vector<uint32_t>& frames) {
+    BenchPlayer player(asset, jobs);
+    const std::vector<size_t> ahead = forward(frames.size());
+    report.passes.push_back(run_pass(player, "cold", jobs, frames, ahead, 1));
+    report.passes.push_back(run_pass(player, "forward", jobs, frames, ahead, 1));
+    report.scaling.push_back(beside_one_worker(single, player, frames));
+    if (jobs == 2) report.two_at_once = two_at_once(single, asset, frames);
+}
+
+nlohmann::json to_json(const Report& report, const AssetDirectory& directory, const std::string& asset, size_t frames) {
+    nlohmann::json passes = nlohmann::json::array(), scaling = nlohmann::json::array(), screen = nlohmann::json::array();
+    for (const auto* list : {&report.passes, &report.details})
+        for (const Pass& pass : *list) passes.push_back(to_json(pass));
+    for (size_t i = 0; i < report.scaling.size(); ++i)
+        scaling.push_back({{"jobs", i + 1}, {"mean_us", report.scaling[i].other}, {"speedup", report.scaling[i].ratio()}});
+    if (report.two_at_once > 0) scaling[1]["two_players_at_once"] = report.two_at_once;
+    for (const ScreenError& e : report.far)
         screen.push_back({{"diagonals", e.diagonals},
                           {"triangles_share", e.triangles},
                           {"mean_pixels", e.mean},
                           {"p99_pixels", e.p99},
                           {"max_pixels", e.max},
                           {"processor_us", e.microseconds}});
-    const double rill_rate = passes[1].triangles_per_second(stage_processor), draco_rate = draco.seconds > 0 ? draco.triangles / draco.seconds : 0;
-    const nlohmann::json json = {
-        {"report", "rill bench"},
-        {"version", 1},
-        {"asset", options.asset},
-        {"frames", frames.size()},
-        {"file_bytes", file_bytes},
-        {"bytes_read_cold", bytes_read},
-        {"memory", memory},
-        {"allocations_in_frames", frame_allocations},
-        {"output_identical", same},
-        {"passes", list},
-        {"scaling", scaling},
-        {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
-        {"camera_jumps",
-         {{"moves", camera.moves},
-          {"changes", camera.changes},
-          {"above_cell", camera.above_cell},
-          {"mean_pixels", camera.mean},
-          {"p99_pixels", camera.p99},
-          {"max_pixels", camera.max},
-          {"above_share", camera.share_above}}},
-        {"draco",
-         {{"bits", 10},
-          {"speed", 0},
-          {"frames", draco.frames},
-          {"triangles_per_second", draco_rate},
-          {"bytes_per_frame", draco.frames ? draco.bytes / double(draco.frames) : 0},
-          {"rill_over_draco", draco_rate > 0 ? rill_rate / draco_rate : 0}}}};
-    if (!options.quiet && options.json != "-") {
-        std::printf("               mean microseconds per frame                                   total\n");
-        std::printf("pass      jobs     plan  decode   field    mesh    wait   total processor       p50     p99     max  Mtri/s  allocations, output hash\n");
-        for (const Pass& pass : passes) print(pass);
-        for (const Pass& pass : details) print(pass);
-        std::printf("output %s; %llu allocations in frames; %s read cold; peak memory %s\n", same ? "identical in all passes" : "DIFFERS between passes",
-                    static_cast<unsigned long long>(frame_allocations), readable_bytes(bytes_read).c_str(),
-                    readable_bytes(memory["peak_bytes"].get<double>()).c_str());
-        if (const size_t narrow = frames_cut(passes); narrow > 0)
-            std::printf("%zu frames did not fit into the buffers that are suggested: their cells are larger, and depend on the frames before\n", narrow);
-        for (const ScreenError& e : far)
-            std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles in %.1f ms, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
-                        double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.microseconds / 1000, e.mean, e.p99, e.max);
-        std::printf("moving away from 1 to 8 diagonals: %u of %u moves change the surface, the worst by %.2f pixels on average, p99 %.2f, max %.1f; "
-                    "%u move something of it by more than %g, the worst %.3f %%\n",
-                    camera.changes, camera.moves, camera.mean, camera.p99, camera.max, camera.above_cell, double(pixel_error_asked), 100 * camera.share_above);
-        if (draco_rate > 0)
-            std::printf("Draco decodes the same meshes at %.2f Mtri/s (10 bits, one core, processor time): Rill runs at %.2f times that\n", draco_rate / 1e6,
-                        rill_rate / draco_rate);
-    }
-    if (!options.json.empty()) write_json(options.json, json);
+    const CameraJumps& camera = report.camera;
+    const BesideDraco& draco = report.draco;
+    return {{"report", "rill bench"},
+            {"version", 1},
+            {"asset", asset},
+            {"frames", frames},
+            {"file_bytes", directory.header.file_bytes},
+            {"bytes_read_cold", report.bytes_read},
+            {"memory", {{"allocations_until_created", report.allocations_until_created}, {"peak_bytes", report.peak_bytes}}},
+            {"allocations_in_frames", report.allocations_in_frames()},
+            {"output_identical", report.same()},
+            {"passes", passes},
+            {"scaling", scaling},
+            {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
+            {"camera_jumps",
+             {{"moves", camera.moves},
+              {"changes", camera.changes},
+              {"above_cell", camera.above_cell},
+              {"mean_pixels", camera.mean},
+              {"p99_pixels", camera.p99},
+              {"max_pixels", camera.max},
+              {"above_share", camera.share_above}}},
+            {"draco",
+             {{"bits", 10},
+              {"speed", 0},
+              {"frames", frames},
+              {"triangles_per_second", draco.triangles_per_second()},
+              {"bytes_per_frame", draco.bytes},
+              {"mean_us", draco.times.other},
+              {"rill_mean_us", draco.times.one},
+              {"rill_over_draco", draco.rill_over_draco()}}}};
+}
+
+void print(const Report& report) {
+    std::printf("               mean microseconds per frame                                   total\n");
+    std::printf("pass      jobs     plan  decode   field    mesh    wait   total processor       p50     p99     max  Mtri/s  allocations, output hash\n");
+    for (const Pass& pass : report.passes) print(pass);
+    for (const Pass& pass : report.details) print(pass);
+    std::printf("output %s; %llu allocations in frames; %s read cold; peak memory %s\n", report.same() ? "identical in all passes" : "DIFFERS between passes",
+                static_cast<unsigned long long>(report.allocations_in_frames()), readable_bytes(double(report.bytes_read)).c_str(),
+                readable_bytes(double(report.peak_bytes)).c_str());
+    if (const size_t narrow = frames_cut(report.passes); narrow > 0)
+        std::printf("%zu frames did not fit into the buffers that are suggested: their cells are larger, and depend on the frames before\n", narrow);
+    for (const ScreenError& e : report.far)
+        std::printf("seen from %g diagonals, cells of %g pixels: %5.1f %% of the triangles in %.1f ms, off by %.2f pixels on average, p99 %.2f, max %.1f\n",
+                    double(e.diagonals), double(pixel_error_asked), 100 * e.triangles, e.microseconds / 1000, e.mean, e.p99, e.max);
+    const CameraJumps& camera = report.camera;
+    std::printf("moving away from 1 to 8 diagonals: %u of %u moves change the surface, the worst by %.2f pixels on average, p99 %.2f, max %.1f; "
+                "%u move something of it by more than %g, the worst %.3f %%\n",
+                camera.changes, camera.moves, camera.mean, camera.p99, camera.max, camera.above_cell, double(pixel_error_asked), 100 * camera.share_above);
+    for (size_t i = 1; i < report.scaling.size(); ++i)
+        std::printf("%zu workers beside one, frame by frame: %.1f ms for %.1f, %.2f times as fast\n", i + 1, report.scaling[i].other / 1000,
+                    report.scaling[i].one / 1000, report.scaling[i].ratio());
+    if (report.two_at_once > 0) std::printf("two players of one worker each, at once: %.2f times the frames of one alone\n", report.two_at_once);
+    const BesideDraco& draco = report.draco;
+    if (draco.triangles > 0)
+        std::printf("Draco beside one worker, frame by frame, on the same meshes (10 bits): %.1f ms for %.1f, %.2f Mtri/s, of processor time; "
+                    "Rill runs at %.2f times that\n",
+                    draco.times.other / 1000, draco.times.one / 1000, draco.triangles_per_second() / 1e6, draco.rill_over_draco());
+}
+
+int bench_command(const BenchOptions& options) {
+    const AssetDirectory directory = read_directory(options.asset);
+    const std::vector<uint32_t> frames = frames_asked_for(directory, options);
+    const int most_jobs = options.jobs > 0 ? options.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
+    Report report;
+    BenchPlayer single(options.asset, 1);
+    measure_single(report, single, frames);
+    for (int jobs = 2; jobs <= most_jobs; ++jobs) measure_several(report, single, options.asset, jobs, frames);
+    if (!options.quiet && options.json != "-") print(report);
+    if (!options.json.empty()) write_json(options.json, to_json(report, directory, options.asset, frames.size()));
     return exit_done;
 }
 

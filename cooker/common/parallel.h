@@ -12,8 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/interrupt.h"
-
 namespace rill::cooker {
 
 /// Threads that `jobs` means: 0 is all cores.
@@ -22,31 +20,30 @@ inline size_t threads_of(int jobs) { return jobs > 0 ? size_t(jobs) : std::max(1
 /// Neighbours that one task should take, of `count`: some, for they share work, but no core goes without.
 inline size_t run_length(size_t count, int jobs) { return std::clamp<size_t>(count / threads_of(jobs), 1, 8); }
 
-/// Calls work(index) for every index < count on up to `jobs` threads (0: all cores). The first exception is
+/// Indices below `count`, each to be worked at once by whoever is free.
+class Batch {
+public:
+    Batch(size_t count, void (*work)(const void*, size_t), const void* context) : count_(count), work_(work), context_(context) {}
+    /// On up to `threads` threads, this one included; returns when all is done. Rethrows the first exception.
+    void run(size_t threads);
+
+private:
+    friend class Crew;
+    void work_off() noexcept;
+    const size_t count_;
+    void (*const work_)(const void*, size_t);
+    const void* const context_;
+    std::atomic<size_t> next_{0};
+    std::mutex failing_;
+    std::exception_ptr failure_;
+    size_t places_ = 0, helpers_ = 0;  ///< for threads that may still come; those that are at it. Under the crew's lock
+};
+
+/// Calls work(index) for every index < count on up to `jobs` threads (0: all cores); within work, too. The first exception is
 /// rethrown here after all threads have ended. Throws Interrupted when the user asked to stop.
 template <class Work>
 void parallel_for(size_t count, int jobs, const Work& work) {
-    const size_t threads = std::min(threads_of(jobs), count);
-    std::atomic<size_t> next{0};
-    std::exception_ptr failure;
-    std::mutex failure_mutex;
-    const auto run = [&] {
-        for (size_t i; (i = next.fetch_add(1)) < count;) {
-            try {
-                stop_if_interrupted();
-                work(i);
-            } catch (...) {
-                const std::lock_guard lock(failure_mutex);
-                if (!failure) failure = std::current_exception();
-                next = count;
-            }
-        }
-    };
-    std::vector<std::thread> pool;
-    for (size_t t = 1; t < threads; ++t) pool.emplace_back(run);
-    run();
-    for (std::thread& thread : pool) thread.join();
-    if (failure) std::rethrow_exception(failure);
+    Batch(count, [](const void* context, size_t i) { (*static_cast<const Work*>(context))(i); }, &work).run(std::min(threads_of(jobs), count));
 }
 
 /// Hands results on in the order of their indices, each as soon as all before it are there: sums come out the same

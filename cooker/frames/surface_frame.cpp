@@ -139,8 +139,8 @@ bool settle(const SurfaceFrame& frame, float radius, SurfacePoint& point) {
     return true;
 }
 
-float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most) {
-    const SurfaceIndex::Hit hit = frame.index.closest(x, most);
+float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most, SurfaceIndex::Near* near) {
+    const SurfaceIndex::Hit hit = frame.index.closest(x, most, near);
     if (!(hit.distance < most)) return 0;
     const Triangle& t = frame.mesh.triangles[hit.triangle];
     return glm::dot(value_at(hit, t, frame.mesh.normals), x - hit.point) > 0 ? -hit.distance : hit.distance;

@@ -81,6 +81,6 @@ struct SurfaceFrame {
 bool settle(const SurfaceFrame& frame, float radius, SurfacePoint& point);
 
 /// How deep x lies in the source's liquid, metres; negative: in the air. 0 farther than `most` from its surface.
-float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most);
+float depth_at(const SurfaceFrame& frame, const glm::vec3& x, float most, SurfaceIndex::Near* near = nullptr);
 
 }  // namespace rill::cooker

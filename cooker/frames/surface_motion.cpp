@@ -53,13 +53,18 @@ struct Pull {
     void add(const glm::vec3& r, const glm::vec3& n, float w) { residual += w * r, normal += w * n, weight += w; }
 };
 
-/// Work(index) for all indices < count, many of them a task.
+/// Work(index, near) for all indices < count, many of them a task; `near`: for queries that follow one another.
 template <class Work>
-void for_each(size_t count, int jobs, const Work& work) {
+void for_rows(size_t count, int jobs, const Work& work) {
     constexpr size_t run = 2048;
     parallel_for((count + run - 1) / run, jobs, [&](size_t r) {
-        for (size_t i = r * run; i < std::min(count, (r + 1) * run); ++i) work(i);
+        SurfaceIndex::Near near;
+        for (size_t i = r * run; i < std::min(count, (r + 1) * run); ++i) work(i, &near);
     });
+}
+template <class Work>
+void for_each(size_t count, int jobs, const Work& work) {
+    for_rows(count, jobs, [&](size_t i, SurfaceIndex::Near*) { work(i); });
 }
 
 Mesh moved_by(const Mesh& mesh, const std::vector<glm::vec3>& motion) {
@@ -75,16 +80,16 @@ std::vector<Pull> find_pulls(const SurfaceIndex& moved, const Neighbours& neighb
     constexpr float alike = 0.3f;  // cosine: across a sheet the other side faces away
     const std::vector<glm::vec3>&here = moved.mesh().positions, &there = to.mesh().positions;
     std::vector<Pull> pulls(here.size());
-    for_each((here.size() + stride - 1) / stride, jobs, [&](size_t k) {
+    for_rows((here.size() + stride - 1) / stride, jobs, [&](size_t k, SurfaceIndex::Near* near) {
         const size_t i = k * stride;
-        const SurfaceIndex::Hit hit = to.closest(here[i], reach);
+        const SurfaceIndex::Hit hit = to.closest(here[i], reach, near);
         if (!(hit.distance < reach)) return;
         const glm::vec3 n = value_at(hit, to.mesh().triangles[hit.triangle], to_normals);
         if (glm::dot(n, neighbours.normal(here, i)) > alike) pulls[i].add(hit.point - here[i], n, 1);
     });
     // What the next surface has and nothing of this one goes to: crowns and fingers as they shoot out.
     std::vector<SurfaceIndex::Hit> hits((there.size() + stride - 1) / stride);
-    for_each(hits.size(), jobs, [&](size_t k) { hits[k] = moved.closest(there[k * stride], reach); });
+    for_rows(hits.size(), jobs, [&](size_t k, SurfaceIndex::Near* near) { hits[k] = moved.closest(there[k * stride], reach, near); });
     for (size_t k = 0; k < hits.size(); ++k) {
         const SurfaceIndex::Hit& hit = hits[k];
         const size_t i = k * stride;
@@ -172,8 +177,8 @@ std::vector<glm::vec3> motion_goes_on(const SurfaceIndex& before, const std::vec
     const Mesh moved = moved_by(before.mesh(), motion);
     const SurfaceIndex index(moved, before, jobs);
     const float near = reach * median_edge(now);
-    for_each(next.size(), jobs, [&](size_t i) {
-        const SurfaceIndex::Hit hit = index.closest(now.positions[i], near);
+    for_rows(next.size(), jobs, [&](size_t i, SurfaceIndex::Near* last) {
+        const SurfaceIndex::Hit hit = index.closest(now.positions[i], near, last);
         if (hit.distance < near) next[i] = inertia * longer * value_at(hit, moved.triangles[hit.triangle], motion);
     });
     return next;
@@ -183,9 +188,9 @@ std::vector<glm::vec3> liquid_motion(const Mesh& from, const Mesh& to, const Sur
     std::vector<glm::vec3> motion(from.positions.size(), glm::vec3(0));
     if (from.velocities.empty() || to.velocities.empty() || to.triangles.empty()) return motion;
     const float dt = float(seconds);
-    for_each(motion.size(), jobs, [&](size_t i) {
+    for_rows(motion.size(), jobs, [&](size_t i, SurfaceIndex::Near* near) {
         const glm::vec3 step = dt * from.velocities[i];
-        const SurfaceIndex::Hit hit = to_index.closest(from.positions[i] + step, std::numeric_limits<float>::infinity());
+        const SurfaceIndex::Hit hit = to_index.closest(from.positions[i] + step, std::numeric_limits<float>::infinity(), near);
         motion[i] = 0.5f * (step + dt * value_at(hit, to.triangles[hit.triangle], to.velocities));
     });
     return motion;
@@ -193,7 +198,9 @@ std::vector<glm::vec3> liquid_motion(const Mesh& from, const Mesh& to, const Sur
 
 double mean_miss(const Mesh& from, const std::vector<glm::vec3>& motion, const SurfaceIndex& to_index, float most, int jobs) {
     std::vector<float> miss(motion.size());
-    for_each(miss.size(), jobs, [&](size_t i) { miss[i] = std::min(most, to_index.closest(from.positions[i] + motion[i], most).distance); });
+    for_rows(miss.size(), jobs, [&](size_t i, SurfaceIndex::Near* near) {
+        miss[i] = std::min(most, to_index.closest(from.positions[i] + motion[i], most, near).distance);
+    });
     double sum = 0;
     for (const float m : miss) sum += m;
     return miss.empty() ? 0 : sum / double(miss.size());

@@ -63,8 +63,9 @@ Sums measure(const Mesh& from, const std::vector<glm::vec3>& from_normals, const
     sums.samples.reserve(from.positions.size() + from.triangles.size());
     std::vector<double> weights(from.positions.size(), 0.0);
     std::vector<bool> used(from.positions.size(), false);
+    SurfaceIndex::Near near;
     auto sample = [&](const glm::vec3& x, const glm::vec3& normal, double weight) {
-        const SurfaceIndex::Hit hit = to.closest(x, infinity);
+        const SurfaceIndex::Hit hit = to.closest(x, infinity, &near);
         sums.add(hit.distance, weight);
         sums.add_angle(normal, value_at(hit, to.mesh().triangles[hit.triangle], to_normals), weight);
         return hit.distance;
@@ -95,7 +96,8 @@ std::vector<uint32_t> find_beyond(const SurfaceIndex& surface, const std::vector
     std::vector<uint8_t> far(positions.size());
     constexpr size_t batch = 1024;
     parallel_for((far.size() + batch - 1) / batch, jobs, [&](size_t part) {
-        for (size_t i = part * batch; i < std::min(far.size(), (part + 1) * batch); ++i) far[i] = !surface.within(positions[i], beyond);
+        SurfaceIndex::Near near;
+        for (size_t i = part * batch; i < std::min(far.size(), (part + 1) * batch); ++i) far[i] = !surface.within(positions[i], beyond, &near);
     });
     std::vector<uint32_t> found;
     for (uint32_t i = 0; i < far.size(); ++i)

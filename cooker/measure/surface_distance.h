@@ -24,8 +24,12 @@ public:
         uint32_t triangle = 0;
         glm::vec3 barycentric{};   ///< of the hit in the triangle
     };
-    Hit closest(const glm::vec3& x, float at_most) const;  ///< at_most: give up beyond (inf: never)
-    bool within(const glm::vec3& x, float distance) const;  ///< closest(x, distance).distance < distance, in less time
+    /// Where one query of a row ended, for the next, near by, to begin there. Of triangles that are equally near it may name another.
+    struct Near {
+        uint32_t leaf = ~0u;
+    };
+    Hit closest(const glm::vec3& x, float at_most, Near* near = nullptr) const;  ///< at_most: give up beyond (inf: never)
+    bool within(const glm::vec3& x, float distance, Near* near = nullptr) const;  ///< closest(x, distance).distance < distance, in less time
     const Mesh& mesh() const;
 private:
     struct Impl;

@@ -166,7 +166,8 @@ struct SurfaceIndex::Impl {
         return base;
     }
     /// Squared distance of the closest triangle that is `at_most` so far, or of any that is nearer than `enough`; else infinity.
-    float search(const glm::vec3& x, float at_most, float enough, uint32_t& triangle) const;
+    /// `near`: the leaf to look at first, if it is one; afterwards that of the triangle.
+    float search(const glm::vec3& x, float at_most, float enough, uint32_t& triangle, uint32_t& near) const;
     void name_triangles() {
         leaves.resize((items.size() + lanes - 1) / lanes);
         for (size_t i = 0; i < leaves.size() * lanes; ++i)
@@ -227,7 +228,7 @@ SurfaceIndex::~SurfaceIndex() = default;
 SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;
 const Mesh& SurfaceIndex::mesh() const { return *impl_->mesh; }
 
-float SurfaceIndex::Impl::search(const glm::vec3& x, float at_most, float enough, uint32_t& triangle) const {
+float SurfaceIndex::Impl::search(const glm::vec3& x, float at_most, float enough, uint32_t& triangle, uint32_t& near) const {
     constexpr float none = std::numeric_limits<float>::infinity();
     struct Entry {
         float distance2;
@@ -236,14 +237,18 @@ float SurfaceIndex::Impl::search(const glm::vec3& x, float at_most, float enough
     uint32_t depth = 0, at = 0;
     float best = at_most * at_most;
     bool found = false;
+    const auto look_at = [&](uint32_t number) {  // false: that is enough
+        const Leaf& leaf = leaves[number];
+        const Lanes distance2 = squared_distances(leaf, x);
+        for (uint32_t k = 0; k < lanes; ++k)
+            if (found ? distance2[k] < best : distance2[k] <= best)
+                best = distance2[k], found = true, triangle = leaf.triangle[k], near = number;
+        return !(found && best < enough * enough);
+    };
+    if (near < leaves.size() && !look_at(near)) return best;
     for (;;) {
         if (at & leaf_bit) {
-            const Leaf& leaf = leaves[at & ~leaf_bit];
-            const Lanes distance2 = squared_distances(leaf, x);
-            for (uint32_t k = 0; k < lanes; ++k)
-                if (found ? distance2[k] < best : distance2[k] <= best)
-                    best = distance2[k], found = true, triangle = leaf.triangle[k];
-            if (found && best < enough * enough) return best;
+            if (!look_at(at & ~leaf_bit)) return best;
         } else {
             // The nearest child is looked at next, the others are pushed far to near: picked by comparing, not by branching, which is
             // guessed wrong half of the time (sorting them in as they come takes a third more).
@@ -269,10 +274,11 @@ float SurfaceIndex::Impl::search(const glm::vec3& x, float at_most, float enough
     }
 }
 
-SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most) const {
+SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most, Near* near) const {
     Hit hit;
+    Near none;
     hit.distance = std::numeric_limits<float>::infinity();
-    if (impl_->nodes.empty() || impl_->search(x, at_most, 0, hit.triangle) == hit.distance) return hit;
+    if (impl_->nodes.empty() || impl_->search(x, at_most, 0, hit.triangle, (near ? near : &none)->leaf) == hit.distance) return hit;
     const Corners t = impl_->corners(hit.triangle);
     const Corners local{t.a - x, t.b - x, t.c - x};
     hit.barycentric = closest_barycentric(local);
@@ -281,9 +287,10 @@ SurfaceIndex::Hit SurfaceIndex::closest(const glm::vec3& x, float at_most) const
     return hit;
 }
 
-bool SurfaceIndex::within(const glm::vec3& x, float distance) const {
+bool SurfaceIndex::within(const glm::vec3& x, float distance, Near* near) const {
     uint32_t any;
-    return !impl_->nodes.empty() && impl_->search(x, distance, distance, any) < distance * distance;
+    Near none;
+    return !impl_->nodes.empty() && impl_->search(x, distance, distance, any, (near ? near : &none)->leaf) < distance * distance;
 }
 
 }  // namespace rill::cooker

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Necks that no point mends (points_to_repairs.cpp), of liquid or of the air between two pieces: thinner than half an edge, the source's
 // mesher drew them, but corners of the runtime's cells hardly ever lie in them. A small ellipsoid of liquid from one side to the other holds
-// what hangs on a neck in that frame; one of air, flat as the gap is, parts what ran together.
+// what hangs on a neck in that frame, one of air keeps the mouth of a cavity open; one of air, flat as the gap is, parts what ran together.
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "tracks/decoded_frame.h"
 #include "tracks/drop_shape.h"
@@ -16,12 +18,12 @@ namespace {
 constexpr float radii[] = {0.45f, 0.6f, 0.75f, 0.9f};    // of a spindle across its neck, the first that holds; half the height of a disc
 constexpr float coded_off = 0.1f;                        // as much thinner it still has to mend
 constexpr float around_neck = 3;                         // corners that are looked at
-// Of spindles of liquid.
+// Of spindles.
 constexpr float longest_gap = 3;                         // farther apart, it is no neck
 constexpr float leans[] = {0, 0.5f};                     // of the way to the nearest corner; a strand just between them would take twice as wide a drop
 constexpr float overlap = 0.6f;                          // into either side
 // Of discs of air.
-constexpr float widest_gap = 1;                          // corners of cells lie in wider ones
+constexpr float widest_gap = 1.5f;                       // corners of cells lie in wider ones
 constexpr float widths[] = {0.75f, 1, 1.5f, 2, 2.5f};    // radii
 constexpr float disc_leans[] = {0, 0.4f, 0.8f};          // of the way to the nearest corner
 constexpr float behind_gap = 0.6f, least_behind = 0.3f;  // so far beyond the air is liquid, so deep: it opens no thin sheet
@@ -35,9 +37,12 @@ glm::vec3 nearest_of(const MeshPieces& pieces, uint32_t piece, const glm::vec3& 
     return best;
 }
 
-/// The field at corners with a disc of air cut out.
-std::vector<float> with_air(std::vector<float> value, const DropShape& disc, const NeckCorners& corners) {
-    for (size_t i = 0; i < value.size(); ++i) value[i] = std::max(value[i], -disc.value({corners.x[i], corners.y[i], corners.z[i]}));
+/// The field at corners with the liquid, or the air, of a shape.
+std::vector<float> with(std::vector<float> value, const DropShape& shape, bool is_liquid, const NeckCorners& corners) {
+    for (size_t i = 0; i < value.size(); ++i) {
+        const float there = shape.value({corners.x[i], corners.y[i], corners.z[i]});
+        value[i] = is_liquid ? std::min(value[i], there) : std::max(value[i], -there);
+    }
     return value;
 }
 
@@ -58,14 +63,12 @@ std::optional<Drop> hold(const SurfaceFrame& frame, const std::vector<uint32_t>&
     const std::vector<float> torn = decoded.field.values_at(corners.x, corners.y, corners.z);
     const glm::vec3 middle = 0.5f * (from + to), axis = gap > 0 ? (to - from) / gap : glm::vec3(0, 0, 1);
     const glm::vec3 corner = edge * glm::round(middle / edge) - middle, aside = corner - glm::dot(corner, axis) * axis;
+    const bool is_liquid = neck.of == TornNeck::Of::liquid;
     for (const float lean : leans)
         for (const float radius : radii) {
             const DropShape spindle = DropShape::spindle(middle + lean * aside, axis, std::max(0.5f * gap + overlap * edge, radius * edge), radius * edge);
             if (!is_alone(spindle, piece, frame, label)) return {};
-            const DropShape drawn = spindle.drawn(edge, coded_off * edge);
-            std::vector<float> held = torn;
-            for (size_t i = 0; i < held.size(); ++i) held[i] = std::min(held[i], drawn.value({corners.x[i], corners.y[i], corners.z[i]}));
-            if (!corners.is_amiss(held, torn)) return spindle.drop(true);
+            if (!corners.is_amiss(with(torn, spindle.drawn(edge, coded_off * edge), is_liquid, corners), torn)) return spindle.drop(is_liquid);
         }
     return {};
 }
@@ -97,7 +100,7 @@ std::optional<DropShape> part(const SurfaceFrame& frame, const MeshPieces& sourc
         for (const float width : widths)
             for (const float height : radii) {
                 const DropShape disc = DropShape::spindle(middle + lean * corner, axis, height * edge, width * edge), drawn = disc.drawn(edge, 0);
-                if (corners.is_amiss(with_air(joined, disc.drawn(edge, coded_off * edge), corners), joined)) continue;
+                if (corners.is_amiss(with(joined, disc.drawn(edge, coded_off * edge), false, corners), joined)) continue;
                 const glm::vec3 behind = (drawn.half.x + behind_gap * edge) * axis;
                 if (std::min(depth_at(frame, disc.centre - behind, INFINITY), depth_at(frame, disc.centre + behind, INFINITY)) < least_behind * edge) continue;
                 if (const double cut = cut_by(drawn, frame); cut < least) least = cut, best = disc;
@@ -105,13 +108,13 @@ std::optional<DropShape> part(const SurfaceFrame& frame, const MeshPieces& sourc
     return best;
 }
 
-/// Spindles of liquid where a piece of the source has been torn.
+/// Spindles of liquid where a piece of the source has been torn, of air where the mouth of a cavity has closed.
 void hold_pieces(const SurfaceFrame& frame, const MeshPieces& source, const DecodedFrame& decoded, std::vector<Drop>& drops) {
-    std::vector<std::array<uint32_t, 2>> held;
+    std::set<std::pair<uint32_t, uint32_t>> held;
     for (const TornNeck& neck : find_torn_necks(source, decoded.pieces, frame.edge)) {
-        if (neck.of != TornNeck::Of::liquid) continue;  // a bubble as thin would hardly hold a corner
-        if (std::find(held.begin(), held.end(), neck.pieces) != held.end()) continue;
-        if (const auto drop = hold(frame, source.label, neck, decoded)) drops.push_back(*drop), held.push_back(neck.pieces), set_velocity(frame, drops.back());
+        const std::pair<uint32_t, uint32_t> pieces = std::minmax(neck.pieces[0], neck.pieces[1]);  // of two bubbles each tells of the other
+        if (held.count(pieces)) continue;
+        if (const auto drop = hold(frame, source.label, neck, decoded)) drops.push_back(*drop), held.insert(pieces), set_velocity(frame, drops.back());
     }
 }
 
@@ -121,7 +124,7 @@ void part_pieces(const SurfaceFrame& frame, const MeshPieces& source, const Deco
     for (const TornNeck& neck : find_false_necks(source, decoded.pieces, frame.edge)) {
         const NeckCorners corners(neck, frame.edge, around_neck * frame.edge, source);
         std::vector<float> joined = decoded.field.values_at(corners.x, corners.y, corners.z);
-        for (const DropShape& disc : parted) joined = with_air(joined, disc.drawn(frame.edge, coded_off * frame.edge), corners);
+        for (const DropShape& disc : parted) joined = with(std::move(joined), disc.drawn(frame.edge, coded_off * frame.edge), false, corners);
         if (!corners.is_amiss(joined, joined)) continue;
         const std::optional<DropShape> disc = part(frame, source, neck, corners, joined);
         if (disc) parted.push_back(*disc), drops.push_back(disc->drop(false)), set_velocity(frame, drops.back());

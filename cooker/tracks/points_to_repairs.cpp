@@ -5,6 +5,7 @@
 // tried: README.md, "Spurs".
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "common/parallel.h"
@@ -22,6 +23,7 @@ constexpr float farthest = 6;             // how far off is told
 constexpr float thin = 2;                 // liquid, or air, that is lost no wider than a least place
 constexpr float least_depth = 0.2f;       // of a probe: nearer to the surface its side is in doubt
 constexpr float point_radius = 1.6f;      // of the fit that places a point
+constexpr float point_reach = 2;          // as far round it the patches of others change
 constexpr float near_by = 24;             // from a place on points count for less and less,
 constexpr float least_near = 6;           // from nearer on where `enough_near` are,
 constexpr float wide = 4;                 // but all of them where it is that wide: their winding number decides there
@@ -94,12 +96,13 @@ struct Place {
 void find_probes(const SurfaceFrame& frame, Place& place) {
     const float spacing = place.neck ? neck_spacing : probe_spacing, least = place.neck ? neck_depth : least_depth;
     const int reach = int(std::lround(1 / spacing));
+    SurfaceIndex::Near near;
     for (int k = -reach; k <= reach; ++k)
         for (int j = -reach; j <= reach; ++j)
             for (int i = -reach; i <= reach; ++i) {
                 if (i * i + j * j + k * k > reach * reach) continue;
                 const glm::vec3 x = place.centre + spacing * place.radius * glm::vec3(i, j, k);
-                const float depth = depth_at(frame, x, most_depth * place.radius);
+                const float depth = depth_at(frame, x, most_depth * place.radius, &near);
                 if (std::fabs(depth) < least * frame.edge) continue;
                 place.x.push_back(x.x), place.y.push_back(x.y), place.z.push_back(x.z), place.depth.push_back(depth);
             }
@@ -213,8 +216,9 @@ Trial best_together(const SurfaceFrame& frame, const Place& place, TrialFields& 
     return best;
 }
 
-/// Takes candidates that mend the place, best first, into `points`; several at once where no single one does.
-void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& points, int jobs) {
+/// Candidates that mend the place, best first, as points that join `points`; several at once where no single one does.
+std::vector<SurfacePoint> repair(const SurfaceFrame& frame, Place& place, const std::vector<SurfacePoint>& points, int jobs) {
+    std::vector<SurfacePoint> repairs;
     const bool all = place.radius > wide * frame.edge;
     TrialFields fields(all ? points : points_around(frame, points, place.centre), most_repairs);
     double now = 0;
@@ -227,29 +231,46 @@ void repair(const SurfaceFrame& frame, Place& place, std::vector<SurfacePoint>& 
     for (size_t taken = 0; taken < most_repairs && !place.candidates.empty();) {
         const double least = place.neck ? gain : std::clamp(least_share * now, gain, most_gain);
         const size_t most = std::min(most_repairs - taken, size_t(now / least));  // more could not pay
-        if (most == 0) return;
+        if (most == 0) break;
         const auto pays = [&](const Trial& trial) { return now - trial.confusion >= double(trial.taken.size()) * least; };
         std::vector<Trial> alone = with_one_more(place, {});
         Trial best = best_of(alone, frame, place, fields, jobs);
         if (!pays(best) && most > 1) best = best_together(frame, place, fields, most, pays, jobs);
-        if (!pays(best)) return;
+        if (!pays(best)) break;
         std::vector<SurfacePoint> left, born;
         for (size_t i = 0; i < place.candidates.size(); ++i) {
             const SurfacePoint& p = place.candidates[i];
             if (std::find(best.taken.begin(), best.taken.end(), i) != best.taken.end()) born.push_back(p);
             else if (best.taken.size() > 1 || alone[i].confusion < now) left.push_back(p);  // who would have mended nothing will not later
         }
-        fields.keep(born), points.insert(points.end(), born.begin(), born.end());
+        fields.keep(born), repairs.insert(repairs.end(), born.begin(), born.end());
         taken += best.taken.size(), now = best.confusion, place.candidates = std::move(left);
     }
+    return repairs;
 }
 
-}  // namespace
+/// Takes out of `left`, places in the order of their turn, those that meet none whose turn is before theirs: what is born in one does not
+/// show in the others. `around`: of two, metres between them.
+std::vector<size_t> take_apart(const std::vector<Place>& places, float around, std::vector<size_t>& left) {
+    const auto meet = [&](size_t i, size_t j) {
+        return glm::distance(places[i].centre, places[j].centre) < places[i].radius + places[j].radius + around;
+    };
+    std::vector<size_t> apart, later;
+    for (size_t k = 0; k < left.size(); ++k) {
+        const bool waits = std::any_of(left.begin(), left.begin() + ptrdiff_t(k), [&](size_t before) { return meet(before, left[k]); });
+        (waits ? later : apart).push_back(left[k]);
+    }
+    left = std::move(later);
+    return apart;
+}
 
-std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
-                                 float beyond, int jobs) {
-    if (points.empty() || frame.mesh.triangles.empty()) return {};
-    const MeshPieces source(frame), pieces(decoded, jobs);
+/// Torn and false necks, then what is farthest off, worst first.
+std::vector<Place> find_places(const SurfaceFrame& frame, const Mesh& decoded, size_t most, float beyond, int jobs) {
+    std::optional<MeshPieces> of_source, of_decoded;
+    parallel_for(2, jobs, [&](size_t k) { k == 0 ? of_decoded.emplace(decoded, jobs) : of_source.emplace(frame); });
+    const MeshPieces &source = *of_source, &pieces = *of_decoded;
+    std::vector<TornNeck> torn, joined;
+    parallel_for(2, jobs, [&](size_t k) { (k == 0 ? torn : joined) = (k == 0 ? find_torn_necks : find_false_necks)(source, pieces, frame.edge); });
     std::vector<Place> places;
     const auto add_necks = [&](const std::vector<TornNeck>& necks, const MeshPieces& of) {
         for (const TornNeck& neck : necks) {
@@ -258,18 +279,35 @@ std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const st
             place.neck.emplace(neck, frame.edge, place.radius, of);
         }
     };
-    add_necks(find_torn_necks(source, pieces, frame.edge), pieces), add_necks(find_false_necks(source, pieces, frame.edge), source);
+    add_necks(torn, pieces), add_necks(joined, source);
     for (const OffSurface& off : find_off(frame, decoded, pieces.index, beyond, jobs)) {
         const auto near = [&](const Place& p) { return !p.neck && glm::distance(p.centre, off.position) < cleared * p.radius; };
         if (std::any_of(places.begin(), places.end(), near)) continue;
-        if (places.size() >= std::max(most_places, points.size() / points_per_place)) break;
+        if (places.size() >= most) break;
         Place& place = places.emplace_back();
         const float wide_as = is_thin(frame, off.position) ? 0 : off.distance + around_void * frame.edge;
         place.centre = off.position, place.radius = std::max(least_radius * frame.edge, wide_as);
     }
     parallel_for(places.size(), jobs, [&](size_t i) { find_probes(frame, places[i]); });
+    return places;
+}
+
+}  // namespace
+
+std::vector<Path> repair_surface(const SurfaceFrame& frame, int sample, const std::vector<SurfacePoint>& points, const Mesh& decoded,
+                                 float beyond, int jobs) {
+    if (points.empty() || frame.mesh.triangles.empty()) return {};
+    std::vector<Place> places = find_places(frame, decoded, std::max(most_places, points.size() / points_per_place), beyond, jobs);
     std::vector<SurfacePoint> all = points;
-    for (Place& place : places) repair(frame, place, all, jobs);
+    std::vector<size_t> left(places.size());
+    std::iota(left.begin(), left.end(), size_t(0));
+    while (!left.empty()) {
+        const std::vector<size_t> apart = take_apart(places, point_reach * frame.edge, left);
+        const int jobs_each = int(std::max<size_t>(1, threads_of(jobs) / apart.size()));
+        std::vector<std::vector<SurfacePoint>> repairs(apart.size());
+        parallel_for(apart.size(), jobs, [&](size_t k) { repairs[k] = repair(frame, places[apart[k]], all, jobs_each); });
+        for (const std::vector<SurfacePoint>& r : repairs) all.insert(all.end(), r.begin(), r.end());
+    }
     std::vector<Path> born;
     for (size_t i = points.size(); i < all.size(); ++i) born.push_back(Path::born(all[i], point_radius * frame.edge, sample));
     return born;

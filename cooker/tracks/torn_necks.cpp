@@ -40,7 +40,8 @@ struct Bounds {
 /// The piece of `other` that most of the vertices lie nearest to.
 uint32_t home_of(const MeshPieces& own, const std::vector<uint32_t>& vertices, const MeshPieces& other) {
     std::map<uint32_t, size_t> votes;
-    for (uint32_t v : vertices) ++votes[other.nearest(own.mesh.positions[v])];
+    SurfaceIndex::Near near;
+    for (uint32_t v : vertices) ++votes[other.nearest(own.mesh.positions[v], &near)];
     const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
     return std::max_element(votes.begin(), votes.end(), fewer)->first;
 }
@@ -75,11 +76,12 @@ std::vector<TornNeck> find_necks(const MeshPieces& own, const MeshPieces& other,
         Bounds bounds;
         for (uint32_t v : vertices) bounds.add(own.mesh.positions[v], around_piece * edge);
         std::vector<TornNeck> places;
+        SurfaceIndex::Near near;
         for (const Triangle& t : other.mesh.triangles) {
             if (other.label[t[0]] != home || !bounds.holds(other.mesh.positions[t[0]])) continue;
             uint32_t beyond = piece, here = 0;
             for (uint32_t v : t) {
-                const uint32_t nearest = own.nearest(other.mesh.positions[v]);
+                const uint32_t nearest = own.nearest(other.mesh.positions[v], &near);
                 if (nearest == piece) ++here;
                 else beyond = nearest;
             }

@@ -22,7 +22,9 @@ public:
     const SurfaceIndex& index;
     std::vector<uint32_t> label;  ///< of the vertices, by label_components()
     /// The piece that x is nearest to, by its label.
-    uint32_t nearest(const glm::vec3& x) const { return label[mesh.triangles[index.closest(x, INFINITY).triangle][0]]; }
+    uint32_t nearest(const glm::vec3& x, SurfaceIndex::Near* near = nullptr) const {
+        return label[mesh.triangles[index.closest(x, INFINITY, near).triangle][0]];
+    }
 };
 
 struct TornNeck {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
@@ -46,6 +47,7 @@ struct ThreadPool {
     std::mutex mutex;
     std::condition_variable wake;
     std::deque<Batch> needed, prefetch;  ///< what the frame waits for goes first
+    std::atomic<uint64_t> submitted{0};    ///< batches so far
     std::vector<std::thread> threads;
     bool stopping = false;
 
@@ -67,8 +69,21 @@ struct ThreadPool {
         for (;;) {
             if (run_one(lock, worker)) continue;
             if (stopping) return;
-            wake.wait(lock);
+            lock.unlock();
+            look_out();
+            lock.lock();
+            if (needed.empty() && prefetch.empty() && !stopping) wake.wait(lock);
         }
+    }
+
+    /// Out of work, within a frame more comes at once: to sleep and be woken takes longer than a stage's last task. (Two workers,
+    /// `dam_break`, a dozen stages a frame: 1.52 times as fast as one if threads sleep at once, 1.56 after 50 µs, 1.7 after 100 and 300.)
+    void look_out() const {
+        constexpr std::chrono::microseconds patience(100);
+        const uint64_t seen = submitted.load(std::memory_order_relaxed);
+        for (const auto start = std::chrono::steady_clock::now();
+             submitted.load(std::memory_order_relaxed) == seen && std::chrono::steady_clock::now() - start < patience;)
+            std::this_thread::yield();
     }
 
     void stop() {
@@ -106,6 +121,7 @@ Jobs thread_jobs(ThreadPool* pool) noexcept {
         {
             const std::lock_guard<std::mutex> lock(pool.mutex);
             (needed_this_frame ? pool.needed : pool.prefetch).push_back({task, context, 0, count});
+            pool.submitted.fetch_add(1, std::memory_order_relaxed);
         }
         count == 1 ? pool.wake.notify_one() : pool.wake.notify_all();
     };

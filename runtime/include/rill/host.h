@@ -10,7 +10,8 @@ namespace rill {
 Memory heap_memory() noexcept;
 
 /// `workers` threads run tasks; the thread in end_frame() helps as worker 0 (so Jobs::workers = workers + 1).
-/// workers 0: everything inline. Null when threads cannot be started.
+/// workers 0: everything inline. Out of work, a thread looks out for more for a tenth of a millisecond before it sleeps. Null when threads
+/// cannot be started.
 struct ThreadPool;
 ThreadPool* start_threads(uint32_t workers) noexcept;
 Jobs thread_jobs(ThreadPool* pool) noexcept;
