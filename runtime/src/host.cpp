@@ -47,7 +47,7 @@ struct ThreadPool {
     std::mutex mutex;
     std::condition_variable wake;
     std::deque<Batch> needed, prefetch;  ///< what the frame waits for goes first
-    std::atomic<uint64_t> submitted{0};    ///< batches so far
+    std::atomic<uint64_t> submitted{0};  ///< batches so far
     std::vector<std::thread> threads;
     bool stopping = false;
 
