@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "mesher.h"
+#include "surface/field_kernels_lanes.h"
 #include "vertex_step.h"
 
 namespace rill {
@@ -102,13 +103,15 @@ const float* corner_values(const Tile& tile, uint32_t cell) {
 
 /// All twelve edges at once: an edge without a crossing costs less than the branch.
 CellCrossings crossings_of(const float* value) {
+    using surface::inner::bits_of, surface::inner::float_of;
     CellCrossings crossings;
     float low[12], high[12];
     for (uint32_t e = 0; e < 12; ++e) low[e] = value[edge_ends.low[e]], high[e] = value[edge_ends.high[e]];
     for (uint32_t e = 0; e < 12; ++e) {
-        const bool crossed = (low[e] < 0) != (high[e] < 0);
-        const float share = low[e] / (crossed ? low[e] - high[e] : 1.f);
-        crossings.share[e] = crossed ? share : 0.f;
+        // By bits, for of a condition on conditions GCC makes branches.
+        const int32_t crossed = (low[e] < 0 ? -1 : 0) ^ (high[e] < 0 ? -1 : 0);
+        const float fall = float_of((int32_t(bits_of(low[e] - high[e])) & crossed) | (int32_t(bits_of(1)) & ~crossed));
+        crossings.share[e] = float_of(int32_t(bits_of(low[e] / fall)) & crossed);
     }
     return crossings;
 }
@@ -149,7 +152,8 @@ struct Placing {
         for (uint32_t a = 0; a < 3; ++a) {
             const float along = share[4 * a] + share[4 * a + 1] + share[4 * a + 2] + share[4 * a + 3];
             const float place = sums.count > 0 ? (along + sums.lower[a]) / sums.count : 0.5f;
-            *out[a] = (corner[a] + std::clamp(place, cell_margin, 1 - cell_margin)) * tile.cell;
+            const float above = place > cell_margin ? place : cell_margin, within = above < 1 - cell_margin ? above : 1 - cell_margin;
+            *out[a] = (corner[a] + within) * tile.cell;
         }
         s.slot[n] = uint16_t(n), s.cell[n] = uint16_t(cell), s.patch[n] = uint8_t(patch);
         s.meets[n] = uint16_t(walls.sides ? walls_met(walls, patches, patch, all, corner) : meets_free), ++n;

@@ -41,7 +41,8 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
 // all normals of a list agree (a third to a half of the lists of two splashes, an eighth of the third's: 5, 3 and 1 % of a frame);
 // candidates narrowed to the box of the sixteen positions first (of 48 a tile 26 are left, 20 have weight; kept in rows of sixteen for that,
 // 3 % of a frame's instructions less; ±0 to 1 % of its time);
-// sums of eight positions after the other eight, so that they stay in registers (2 % slower).
+// sums of eight positions after the other eight, so that they stay in registers (2 % slower; with AVX2 and SSE, whose sixteen registers do not hold
+// those of sixteen, 1 to 3 %).
 
 /// Squared distance and place in a block of a list in one word: the least word is that of the nearest, and the first of
 /// equals. What the place takes away is less than 1e-5 of the distance. (In three words: frames 5 to 8 % slower.)

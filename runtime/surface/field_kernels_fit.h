@@ -62,7 +62,7 @@ struct Search {
     /// Of one neighbour of one of the points: squared distance, and the word if it faces the same way.
     RILL_INLINE float distance2(uint32_t j, uint32_t l) const {
         const float rx = f.x[j] - x[l], ry = f.y[j] - y[l], rz = f.z[j] - z[l], d2 = rx * rx + ry * ry + rz * rz;
-        return first + l == j ? beyond : d2;
+        return d2 + (first + l == j ? beyond : 0.f);  // of a sum to choose from Clang would make a branch
     }
     RILL_INLINE int32_t key_of(uint32_t j, uint32_t l, float d2) const {
         const float agree = f.nx[j] * nx[l] + f.ny[j] * ny[l] + f.nz[j] * nz[l];
@@ -71,13 +71,13 @@ struct Search {
     }
     /// Whether it is nearer to any of the points than the last that is known.
     RILL_INLINE bool is_wanted(uint32_t j) const {
-        int32_t wanted = 0;
+        int32_t wanted = 0;  // its sign; of conditions Clang would make no vectors
         for (uint32_t l = 0; l < lanes; ++l) {
             const float d2 = distance2(j, l);
-            const int32_t word = key_of(j, l, d2);
-            wanted |= (word < same[most_neighbours - 1][l] ? -1 : 0) | (d2 < any[support_neighbour - 1][l] ? -1 : 0);
+            wanted |= key_of(j, l, d2) - same[most_neighbours - 1][l];
+            wanted |= int32_t(bits_of(d2)) - int32_t(bits_of(any[support_neighbour - 1][l]));
         }
-        return wanted != 0;
+        return wanted < 0;
     }
     RILL_INLINE void take(uint32_t j) {
         // A crowd of which a thousand were nearer than any before them: who comes later is not heard.
