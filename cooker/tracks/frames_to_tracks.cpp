@@ -39,7 +39,7 @@ struct Loss {
 constexpr Loss surplus_loss{0.3f, 0.1f};   // a point on its way; .2 and .45 tolerances: 0 and +2.5 %; of points that mend a frame
                                            // .6, born at 3 tolerances: −.9 %, but rims of dam_break 41 were torn
 constexpr Loss fleeting_loss{0.9f, 0.4f};  // one that lives for so few frames that its birth is most of its bytes
-constexpr size_t fleeting = 8;             // frames
+constexpr size_t fleeting = 4;             // frames
 
 /// Spacing that thinning leaves, metres. What quadratics leave grows with its cube. Wider patches outreach the liquid's depth, and
 /// the winding number has too few discs; five edges at every error took 2, 24 and 0 % more bytes at .25, .12 and .5 edges.
