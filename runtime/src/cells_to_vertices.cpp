@@ -152,6 +152,7 @@ struct Placing {
         for (uint32_t a = 0; a < 3; ++a) {
             const float along = share[4 * a] + share[4 * a + 1] + share[4 * a + 2] + share[4 * a + 3];
             const float place = sums.count > 0 ? (along + sums.lower[a]) / sums.count : 0.5f;
+            // (std::clamp becomes branches.)
             const float above = place > cell_margin ? place : cell_margin, within = above < 1 - cell_margin ? above : 1 - cell_margin;
             *out[a] = (corner[a] + within) * tile.cell;
         }
