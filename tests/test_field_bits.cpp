@@ -37,6 +37,23 @@ TEST_CASE("candidates beyond reach and the cut into batches change no bit") {
     }
 }
 
+TEST_CASE("positions that are reached by more points together than a list holds tell what each does alone") {
+    Cloud cloud;
+    Random random(17);
+    std::vector<Vec> positions;
+    for (int i = 0; i < 40; ++i) positions.push_back({double(i % 2), 0.02 * random(), 0.1 * random()});
+    for (uint32_t i = 0; i < surface::most_listed + 500; ++i) cloud.add(Vec{double(i % 2), 0, 0} + 0.1 * random.direction(), {0, 0, 1});
+    const RealField real(cloud);
+    for (uint32_t i = 0; i < real.field.point_count; ++i) real.field.patches[i].inverse = 9;  // half of them reach either end
+    std::vector<uint32_t> all(real.field.point_count);
+    for (uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+    const std::vector<Value> values = evaluate(real.field, all, positions, 10000);
+    std::vector<Value> one_by_one;
+    for (const Vec& p : positions) one_by_one.push_back(evaluate(real.field, all, {p}, 1).front());
+    CHECK(same_bits(values, one_by_one));
+    for (const Value& v : values) CHECK(std::isfinite(v.value));
+}
+
 TEST_CASE("at the surface the blend stands; where it is far from zero it is asked and answered as elsewhere") {
     Cloud cloud;
     add(cloud, torus_of(1, 0.4), 0.12);

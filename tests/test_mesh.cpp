@@ -376,6 +376,21 @@ TEST_CASE("the same bytes at any number of workers") {
     }
 }
 
+TEST_CASE("where a part of the points crosses more tiles than it has room for, they are found all the same") {
+    // Points are looked at in parts that have as much room each: of these nearly all stand in a ball smaller than a tile.
+    Cloud cloud;
+    add_sphere(cloud, {3, 3, 3}, 0.02, 16000);
+    constexpr int balls = 12;
+    for (int i = 0; i < balls; ++i) add_sphere(cloud, {0.4 * (i % 4), 0.4 * (i / 4), 0}, 0.15, 40);
+    const RealField real(cloud);
+    for (const uint32_t tiles : {3000u, 30000u}) {
+        const Mesh m = mesh(real.field, {.cell = 0.01f, .tiles = tiles});
+        CHECK(m.counts.cut == 0);
+        CHECK(topology(m).closed_manifold());
+        CHECK(topology(m).euler == 2 * (balls + 1));
+    }
+}
+
 TEST_CASE("nothing in, nothing out") {
     Cloud cloud;
     const RealField real(cloud);

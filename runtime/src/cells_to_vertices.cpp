@@ -316,7 +316,7 @@ void place_cells(const Mesher& m, MesherScratch& s, Tile& tile, const Output& ou
 
 void place_tile(const Mesher& m, MesherScratch& s, Tile& tile) {
     for (int a = 0; a < 3; ++a) tile.lower[a] = surface::unsupported, tile.upper[a] = -surface::unsupported;
-    list_candidates(m, s, tile);
+    take_candidates(m, s, tile);
     const bool morphs = find_parents(m, s, tile);
     if (morphs) {
         place_cells(m, s, s.parents.tile, {m, nullptr, false});

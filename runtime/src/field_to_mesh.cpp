@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The mesher's memory and its table of stages. march.cpp finds the surface cells, drop_specks.cpp
+// The mesher's memory and its table of stages. points_to_tiles.cpp and march.cpp find the surface cells, drop_specks.cpp
 // clears noise from them, cells_to_vertices.cpp places their vertices, vertices_to_normals.cpp gives these their
 // normals, mesh_to_buffers.cpp joins them to triangles in the caller's buffers. small_drops.cpp draws what
 // cells are too coarse for.
@@ -47,6 +47,7 @@ size_t carve(void* memory, const MeshLimits& limits, Mesher& m) {
     m.hash = carver.take<uint32_t>(hash_slots(limits.tiles));
     m.active = carver.take<uint32_t>(limits.tiles);
     m.next_active = carver.take<uint32_t>(limits.tiles);
+    m.seeds = carver.take<SeedTile>(most_seeds(limits));
     m.order = carver.take<OrderedTile>(limits.tiles);
     m.drops = carver.take<SmallDrop>(limits.drops);
     m.vertices = carver.take<PlacedVertex>(limits.vertices);
@@ -95,7 +96,10 @@ bool start_coarser(Mesher& m, float octaves) {
 uint32_t prepare_round(void* mesher) {
     constexpr float octaves_when_late = 1;
     Mesher& m = *static_cast<Mesher*>(mesher);
-    if (m.input.late && m.input.late(m.input.user) && start_coarser(m, octaves_when_late)) m.cut |= cut_time;
+    if (m.input.late && m.input.late(m.input.user) && start_coarser(m, octaves_when_late)) {
+        m.cut |= cut_time;
+        return 0;
+    }
     return prepare_march(mesher);
 }
 
@@ -108,6 +112,7 @@ uint32_t prepare_layout(void* mesher) {
 
 constexpr Stage phases[] = {
     {prepare_judge_drops, run_judge_drops, false},
+    {prepare_seeds, run_seeds, false},
     {prepare_round, run_march, true},
     {prepare_find_specks, run_find_specks, false},
     {prepare_turn_specks, nullptr, false},

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which cells the surface crosses: marched from the points (Keeler & Bridson, section 1). Cells crossed by
-// the points' own discs are visited first; every face with corners of both signs then leads to the cell
-// beyond it, until no such face is left. So the surface is closed wherever room and views let it be.
+// the points' own discs are visited first (points_to_tiles.cpp); every face with corners of both signs then leads to the
+// cell beyond it, until no such face is left. So the surface is closed wherever room and views let it be.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -11,126 +11,14 @@
 namespace rill {
 namespace {
 
-constexpr float disc_share = 0.3f;  // of a patch's support: discs of neighbours nearly touch; the march fills in
-constexpr int most_seed_tiles = 4;  // either way from a point; the march does the rest
-
-/// Points at a wall may stand a little beyond it: the surface is this side, a quarter of a cell and more.
-float in_container(const surface::Field& f, int axis, float place, float cell) {
-    const float lower = f.container.lower[axis] + 0.25f * cell, upper = f.container.upper[axis] - 0.25f * cell;
-    return std::max(lower, std::min(place, upper));
-}
-
-void want(Tile& tile, const int cell[3]) {
-    const int row = cell[1] + 8 * cell[2];
-    tile.pending[row] |= uint8_t(1 << cell[0] & ~tile.visited[row]);
-}
-
-/// Tiles that the disc of a point may cross.
-struct SeedDisc {
-    const float *p, *n;
-    int32_t level, home[3];
-};
-void seed_box(Mesher& m, const SeedDisc& disc, int32_t level, const int32_t c[3]) {
-    const Levels& levels = m.input.levels;
-    const float size = tile_cells * levels.cell(level);
-    float height = 0, reach = 0;
-    for (int a = 0; a < 3; ++a) {
-        height += disc.n[a] * ((float(c[a]) + 0.5f) * size - disc.p[a]);
-        reach += 0.5f * size * std::abs(disc.n[a]);
+/// The walls that come near to the tile. (Farther than two cells no wall is nearer to a corner than what crosses its edges.)
+surface::Container walls_beside(surface::Container container, const Tile& tile) {
+    const float reach = std::max(surface::bevel_reach(container), 2 * tile.cell);
+    for (uint32_t a = 0; a < 3; ++a) {
+        if (corner_at(tile, a, 0) > container.lower[a] + reach) container.lower[a] = surface::everywhere.lower[a];
+        if (corner_at(tile, a, tile_cells) < container.upper[a] - reach) container.upper[a] = surface::everywhere.upper[a];
     }
-    const bool is_home = level == disc.level && std::equal(c, c + 3, disc.home);
-    if (std::abs(height) > reach && !is_home) return;
-    if (levels.divided(level, c)) {
-        for (int k = 0; k < 8; ++k) {
-            const int32_t child[3] = {2 * c[0] + (k & 1), 2 * c[1] + (k >> 1 & 1), 2 * c[2] + (k >> 2)};
-            seed_box(m, disc, level - 1, child);
-        }
-        return;
-    }
-    int32_t box[3] = {c[0], c[1], c[2]}, above[3];
-    for (; level < levels.coarsest(); ++level) {
-        parent_of(box, above);
-        if (levels.divided(level + 1, above)) break;
-        std::copy(above, above + 3, box);
-    }
-    const uint32_t tile = find_or_create_tile(m, level, box);
-    if (tile != no_tile) queue_tile(m, tile);
-}
-void seed_point(Mesher& m, uint32_t i) {
-    const surface::Field& f = *m.input.field;
-    const float n[3] = {f.nx[i], f.ny[i], f.nz[i]};
-    float p[3] = {f.x[i], f.y[i], f.z[i]};
-    for (int a = 0; a < 3; ++a) p[a] = in_container(f, a, p[a], m.input.levels.cell_size);
-    SeedDisc disc{p, n, 0, {}};
-    if (!leaf_at(m, p, disc.level, disc.home)) return;
-    const float radius = disc_share * f.support[i], inverse = 1 / (tile_cells * m.input.levels.cell(disc.level));
-    int32_t from[3], to[3];
-    for (int a = 0; a < 3; ++a) {
-        const float extent = radius * std::sqrt(std::max(0.f, 1 - n[a] * n[a])) * inverse, at = p[a] * inverse;
-        from[a] = disc.home[a] + int32_t(std::max(std::floor(at - extent) - std::floor(at), -float(most_seed_tiles)));
-        to[a] = disc.home[a] + int32_t(std::min(std::floor(at + extent) - std::floor(at), float(most_seed_tiles)));
-    }
-    int32_t c[3];
-    for (c[2] = from[2]; c[2] <= to[2]; ++c[2])
-        for (c[1] = from[1]; c[1] <= to[1]; ++c[1])
-            for (c[0] = from[0]; c[0] <= to[0]; ++c[0]) seed_box(m, disc, disc.level, c);
-}
-
-/// The cells where the six half axes leave the ellipsoid; it is convex, so the march finds the rest.
-void seed_drop(Mesher& m, uint32_t i) {
-    const surface::Field& f = *m.input.field;
-    constexpr int row[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
-    for (int a = 0; a < 6; ++a) {
-        float p[3] = {f.dx[i], f.dy[i], f.dz[i]}, length2 = 0;
-        for (int k : row[a / 2]) length2 += f.inverse[k][i] * f.inverse[k][i];
-        if (!(length2 > 0)) continue;
-        p[a / 2] += (a & 1 ? 1.f : -1.f) / std::sqrt(length2);
-        int32_t level, tile_coord[3];
-        if (!leaf_at(m, p, level, tile_coord)) continue;
-        int cell[3];
-        for (int b = 0; b < 3; ++b) {
-            cell[b] = int32_t(std::floor(p[b] / m.input.levels.cell(level))) - tile_cells * tile_coord[b];
-            cell[b] = std::clamp(cell[b], 0, tile_cells - 1);
-        }
-        const uint32_t tile = find_or_create_tile(m, level, tile_coord);
-        if (tile == no_tile) continue;
-        want(m.tiles[tile], cell);
-        queue_tile(m, tile);
-    }
-}
-
-/// Marks the cells of the tile that the discs of its points cross. A guess is enough: the march finds what is missed.
-void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) {
-    const surface::Field& f = *m.input.field;
-    const float cells = 1 / tile.cell;
-    uint8_t rows[rows_per_tile] = {};
-    for (uint32_t c = 0; c < std::min(s.candidate_count, s.most_candidates); ++c) {
-        const uint32_t i = s.candidates[c];
-        if (i >= f.point_count) break;  // drops come last
-        const float place[3] = {in_container(f, 0, f.x[i], tile.cell), in_container(f, 1, f.y[i], tile.cell), in_container(f, 2, f.z[i], tile.cell)};
-        const float normal[3] = {f.nx[i], f.ny[i], f.nz[i]};
-        const float radius = disc_share * f.support[i] * cells;
-        float at[3];  // in cells of this tile
-        bool touches = true, is_home = true;
-        for (int a = 0; a < 3; ++a) {
-            at[a] = place[a] * cells - float(tile_cells * tile.coord[a]);
-            touches = touches && at[a] > -radius && at[a] < tile_cells + radius;
-            is_home = is_home && at[a] >= 0 && at[a] < tile_cells;
-        }
-        if (!touches) continue;
-        m.draw(at, normal, radius, rows);
-        if (is_home) rows[int(at[1]) + 8 * int(at[2])] |= uint8_t(1 << int(at[0]));
-    }
-    for (uint32_t row = 0; row < rows_per_tile; ++row) tile.pending[row] |= uint8_t(rows[row] & ~tile.visited[row]);
-}
-
-/// Whether no wall comes near the tile.
-bool is_inside(const surface::Container& container, const Tile& tile) {
-    const float reach = surface::bevel_reach(container);
-    bool inside = true;
-    for (uint32_t a = 0; a < 3; ++a)
-        inside = inside && corner_at(tile, a, 0) > container.lower[a] + reach && corner_at(tile, a, tile_cells) < container.upper[a] - reach;
-    return inside;
+    return container;
 }
 
 /// Corners of the pending cells, by row. Rows are spread over y and then over z, eight at a time.
@@ -176,9 +64,9 @@ void evaluate_corners(const Mesher& m, MesherScratch& s, Tile& tile) {
     const uint32_t n = list_corners(s, tile, missing);
     for (uint32_t row = 0; row < 81; ++row) tile.known[row] |= missing[row];
     s.corners_evaluated += n;
-    const surface::Field& field = is_inside(m.input.field->container, tile) ? m.uncut : *m.input.field;
+    s.field.container = walls_beside(m.input.field->container, tile);
     with_candidates(m, s, n, [&](const uint32_t* candidates, uint32_t count, uint32_t first, uint32_t batch) {
-        m.access.evaluate(field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
+        m.access.evaluate(s.field, candidates, count, s.x + first, s.y + first, s.z + first, batch,
                           s.value + first);
     });
     for (uint32_t i = 0; i < n; ++i) {
@@ -256,28 +144,30 @@ struct Crossing {
     bool up;
 };
 
-/// True when the cell was not visited yet.
-bool ask_cell(Tile& tile, const Crossing& c, uint32_t i, uint32_t j) {
-    int cell[3];
-    cell[c.axis] = c.up ? 0 : tile_cells - 1;  // the neighbour's layer next to us
-    cell[c.u] = int(i), cell[c.v] = int(j);
-    if (tile.visited[cell[1] + 8 * cell[2]] >> cell[0] & 1) return false;
-    want(tile, cell);
-    return true;
-}
-
 template <typename Work>
 void for_wanted(uint64_t wanted, Work work) {
-    for (uint32_t bit = 0; wanted; ++bit, wanted >>= 1)
-        if (wanted & 1) work(bit % 8, bit / 8);
+    for (const uint32_t half : {0u, 4u}) for_bits(uint32_t(wanted >> 8 * half), [&](uint32_t k) { work(k % 8, k / 8 + half); });
+}
+
+/// True when one of the cells was not visited yet.
+bool ask_cells(Tile& tile, const Crossing& c, uint64_t wanted) {
+    const uint32_t layer = c.up ? 0 : tile_cells - 1;  // the neighbour's next to us
+    uint32_t more = 0;
+    const auto ask = [&](uint32_t row, uint32_t bits) {
+        const uint32_t fresh = bits & ~uint32_t(tile.visited[row]);
+        tile.pending[row] |= uint8_t(fresh), more |= fresh;
+    };
+    if (c.axis == 0)
+        for_wanted(wanted, [&](uint32_t i, uint32_t j) { ask(i + 8 * j, 1u << layer); });
+    else
+        for (uint32_t j = 0; j < 8; ++j) ask(c.axis == 1 ? layer + 8 * j : j + 8 * layer, uint32_t(wanted >> 8 * j) & 255);
+    return more != 0;
 }
 
 void ask_same(Mesher& m, int32_t level, const int32_t there[3], const Crossing& c, uint64_t wanted) {
     const uint32_t neighbour = find_or_create_tile(m, level, there);
     if (neighbour == no_tile) return;
-    bool more = false;
-    for_wanted(wanted, [&](uint32_t i, uint32_t j) { more |= ask_cell(m.tiles[neighbour], c, i, j); });
-    if (more) queue_tile(m, neighbour);
+    if (ask_cells(m.tiles[neighbour], c, wanted)) queue_tile(m, neighbour);
 }
 
 /// Four of our cells border on one of the larger.
@@ -342,15 +232,14 @@ uint32_t prepare_march(void* mesher) {
     Mesher& m = *static_cast<Mesher*>(mesher);
     if (!usable(m.input)) return 0;
     if (m.seeding) {
+        m.seeding = false;
         m.uncut = *m.input.field, m.uncut.container = surface::everywhere;
-        for (uint32_t i = 0; i < m.input.field->point_count; ++i) seed_point(m, i);
+        for (uint32_t w = 0; w < m.limits.workers; ++w) m.scratch[w].field = m.uncut;
         change_drops(m);
-        for (uint32_t i = 0; i < m.input.field->drop_count; ++i)
-            if (i >= m.drop_count || m.drops[i].in_cells) seed_drop(m, i);
+        plant_seeds(m);
     } else {
         for (uint32_t i = 0; i < m.active_count; ++i) exchange(m, m.active[i]);
     }
-    m.seeding = false;
     take_colour(m);
     if (m.active_count == 0 && m.next_active_count) take_colour(m);
     return tasks_of(m.active_count, tiles_per_march_task);

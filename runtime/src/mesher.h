@@ -32,6 +32,7 @@ struct PlacedCells {
 /// Cells are addressed by row = y + 8 z and bit x, corners by row = y + 9 z and bit x. Corners on a shared
 /// face stand in both tiles, with the same bits whoever evaluates them: the field is a pure function of x.
 struct Tile {
+    static constexpr uint32_t kept_candidates = 96;
     int32_t level, coord[3];
     float cell;                      ///< size of its cells
     uint64_t beside;                 ///< two bits per place
@@ -54,6 +55,8 @@ struct Tile {
         float value[corners_per_tile];  ///< until the vertices are placed
         PlacedCells placed;
     };
+    uint32_t candidate_count;        ///< as MesherScratch's
+    uint32_t candidates[kept_candidates];  ///< unless there are more
 };
 
 /// Faces spanned by corners x and x + 1 of the rows: both signs present.
@@ -106,6 +109,7 @@ struct MesherScratch {
     uint16_t cell[capacity];
     uint8_t patch[capacity];
     uint16_t meets[capacity];  ///< bits of the walls that its crossings lie in, as format::Header::walls, meets_free, nears_wall, nears_edge
+    surface::Field field;      ///< the input's, with the walls alone that the tile is near to
     PlacedCells placed;        ///< of a tile whose corner values are not used up yet
     ParentCells parents;
     uint64_t corners_evaluated;
@@ -138,6 +142,18 @@ struct SmallDrop {
     float centre[3], inverse[6], radius, reach;
 };
 
+/// A leaf that a point's disc may cross.
+struct SeedTile {
+    int32_t level, coord[3];
+};
+/// What a task found: so many, of its points before `next_point`; for those from there on there was no room.
+struct SeedList {
+    uint32_t count, next_point;
+};
+inline constexpr uint32_t most_seed_tasks = 64;
+/// Of all tasks together; neighbours among them find the same tiles.
+inline uint32_t most_seeds(const MeshLimits& limits) { return 2 * limits.tiles; }
+
 struct Mesher {
     MeshLimits limits;
     MeshInput input;
@@ -159,6 +175,9 @@ struct Mesher {
     uint32_t *active, *next_active;  ///< tiles of this round, of the coming one
     uint32_t active_count, next_active_count;
     bool seeding;
+    SeedTile* seeds;      ///< `seed_room` per task
+    SeedList seed_lists[most_seed_tasks];
+    uint32_t seed_tasks, seed_points, seed_room;  ///< points and room: of each task
     uint32_t colour;  ///< of the chequerboard, whose tiles run this round
     OrderedTile* order;
     uint32_t order_count, kept;  ///< tiles with surface; how many of them are drawn
@@ -205,8 +224,17 @@ void settle_hanging(Tile& tile, const uint16_t hanging[81], const uint16_t need[
 /// Fills Tile::turned: where the smaller cells join the liquid across an ambiguous face of a larger one.
 void turn_border_faces(Tile& tile) noexcept;
 
-// march.cpp: field → surface cells
+// points_to_tiles.cpp: where the march begins
 inline bool usable(const MeshInput& input) { return input.field && input.levels.cell_size > 0 && input.levels.cell_size < 1e12f; }
+uint32_t prepare_seeds(void* mesher);
+void run_seeds(void* mesher, uint32_t task, uint32_t worker);
+/// One thread, once those are found: makes the tiles and queues them.
+void plant_seeds(Mesher& m) noexcept;
+/// Marks the cells of a tile that the discs of its points, the worker's candidates, cross. A guess is enough: the march finds what is
+/// missed.
+void draw_discs(const Mesher& m, MesherScratch& s, Tile& tile) noexcept;
+
+// march.cpp: field → surface cells
 uint32_t prepare_march(void* mesher);
 void run_march(void* mesher, uint32_t task, uint32_t worker);
 
@@ -291,8 +319,10 @@ uint32_t prepare_quads(void* mesher);
 void run_quads(void* mesher, uint32_t task, uint32_t worker);
 uint32_t prepare_ranges(void* mesher);
 
-/// Lists what may matter to any position of the tile.
-void list_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept;
+/// Lists what may matter to any position of the tile, for it and for the worker.
+void list_candidates(const Mesher& m, MesherScratch& s, Tile& tile) noexcept;
+/// The same for the worker once it has been done for the tile.
+void take_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept;
 
 /// Work(candidates, count, first, n) for positions [first, first + n) of the scratch, whose box is halved until its
 /// candidates fit; those of a single position are then cut: still a pure function of it.

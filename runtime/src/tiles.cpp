@@ -138,11 +138,28 @@ uint32_t find_or_create_tile(Mesher& m, int32_t level, const int32_t coord[3]) n
     return m.tile_count - 1;
 }
 
-void list_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept {
+namespace {
+void gather_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) {
     surface::Box box;
     for (uint32_t a = 0; a < 3; ++a)
         box.lower[a] = corner_at(tile, a, 0), box.upper[a] = corner_at(tile, a, tile_cells);
     s.candidate_count = m.access.gather(*m.input.field, box, s.candidates, s.most_candidates);
+}
+}  // namespace
+
+void list_candidates(const Mesher& m, MesherScratch& s, Tile& tile) noexcept {
+    gather_candidates(m, s, tile);
+    tile.candidate_count = s.candidate_count;
+    if (s.candidate_count <= Tile::kept_candidates) std::copy(s.candidates, s.candidates + s.candidate_count, tile.candidates);
+}
+
+void take_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept {
+    if (tile.candidate_count > Tile::kept_candidates) {
+        gather_candidates(m, s, tile);
+        return;
+    }
+    s.candidate_count = tile.candidate_count;
+    std::copy(tile.candidates, tile.candidates + tile.candidate_count, s.candidates);
 }
 
 void queue_tile(Mesher& m, uint32_t index) noexcept {

@@ -109,7 +109,7 @@ struct Evaluation {
     float trusted_value;  ///< up to this, values are not doubted
     const Results& out;
     Batch batch;
-    uint32_t list[most_listed];
+    uint32_t list[most_listed + listing_block];
 
     Evaluation(const Field& field, const uint32_t* all, uint32_t count, float trusted, const Results& results)
         : f(field), candidates(all), candidate_count(count), trusted_value(trusted), out(results) {}

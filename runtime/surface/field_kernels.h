@@ -9,6 +9,7 @@ namespace rill::surface {
 struct Field;
 inline constexpr uint32_t lanes = 16;
 inline constexpr uint32_t most_listed = 1024;     // patches that a batch may blend
+inline constexpr uint32_t listing_block = 32;     // of candidates: a list has room for one more than fits
 inline constexpr uint32_t most_neighbours = 14;   // rows of a fit
 inline constexpr uint32_t support_neighbour = 6;  // whose distance gives the support
 inline constexpr float nowhere = 1e12f;           // place of what fills whole sixteens up
@@ -39,8 +40,8 @@ struct Kernels {
     bool fused;  ///< multiplies and adds with one rounding
     /// Points of the field whose weight can be non-zero somewhere in the box, as surface::gather().
     uint32_t (*gather)(const Field&, const float lower[3], const float upper[3], uint32_t* out, uint32_t capacity);
-    /// Fills all but the places in, and lists who of the candidates has weight, `most_listed` at most; `listed`: how many
-    /// there are. Returns bits of the lanes to ask the winding number for: none up to |value| `trusted`.
+    /// Fills all but the places in, and lists who of the candidates has weight. Beyond `most_listed`, which are all that count,
+    /// `listed` says that there are more, no longer how many. `list` has room for `most_listed + listing_block`. Returns bits of the lanes to ask the winding number for: none up to |value| `trusted`.
     uint32_t (*blend)(const Field&, const uint32_t* candidates, uint32_t count, uint32_t* list, uint32_t& listed, float trusted, Batch&);
     void (*slope)(const Field&, const uint32_t* list, uint32_t count, const Batch&, bool velocity, Slopes&);
     /// Winding number of all points at a position, and about the squared distance to the nearest.

@@ -40,17 +40,28 @@ RILL_INLINE float weight_b_of(float u2, float w, float agree) {
 // eight positions at a time (a sixth fewer patches for each, yet the blend takes 20 % longer); a path without clusters where
 // all normals of a list agree (a third to a half of the lists of two splashes, an eighth of the third's: 5, 3 and 1 % of a frame);
 // candidates narrowed to the box of the sixteen positions first (of 48 a tile 26 are left, 20 have weight; kept in rows of sixteen for that,
-// 3 % of a frame's instructions less; ±0 to 1 % of its time);
+// candidates narrowed to the box of the sixteen positions first, by rows of places and normals (of 51 and 35 a tile 21 and 17 have weight;
+// 2 and 4 % of a frame slower, .5 and 1 % with AVX2);
 // sums of eight positions after the other eight, so that they stay in registers (2 % slower; with AVX2 and SSE, whose sixteen registers do not hold
 // those of sixteen, 1 to 3 %).
 
-/// Squared distance and place in a block of a list in one word: the least word is that of the nearest, and the first of
+/// Squared distance and place in a block of a list in one word: the greatest is that of the nearest, and the first of
 /// equals. What the place takes away is less than 1e-5 of the distance. (In three words: frames 5 to 8 % slower.)
 // Signed, for most machines compare no other words.
-constexpr int32_t block = 32, place_bits = block - 1, distance_bits = no_word & ~place_bits;
+constexpr int32_t place_bits = listing_block - 1, distance_bits = no_word & ~place_bits;
+struct Places {
+    uint32_t bit[listing_block];
+    int32_t from_last[listing_block];
+};
+constexpr Places all_places() {
+    Places places{};
+    for (int32_t c = 0; c <= place_bits; ++c) places.bit[c] = 1u << c, places.from_last[c] = place_bits - c;
+    return places;
+}
+constexpr Places places = all_places();  // to be read, for many instructions take from memory what else had to be spread over lanes first
 
-/// What a block of patches is to each position: bits of those that have weight there, the word of the nearest among them,
-/// and the least u² of any.
+/// What a block of patches is to each position: bits of those that have weight there, the word of the nearest among them
+/// (0: none), and the least u² of any.
 struct alignas(64) Reached {
     uint32_t bits[lanes];
     int32_t nearest[lanes];
@@ -61,41 +72,41 @@ RILL_INLINE void find_reached(const Field& f, const uint32_t* list, uint32_t cou
     alignas(64) uint32_t bits[lanes];
     alignas(64) int32_t nearest[lanes];
     alignas(64) float least[lanes];
-    for (uint32_t l = 0; l < lanes; ++l) bits[l] = 0, nearest[l] = no_word, least[l] = unsupported;
+    for (uint32_t l = 0; l < lanes; ++l) bits[l] = 0, nearest[l] = 0, least[l] = unsupported;
     for (uint32_t c = 0; c < count; ++c) {
         const Patch p = f.patches[list[c]];
-        const uint32_t bit = 1u << c;
+        const uint32_t bit = places.bit[c];
+        const int32_t from_last = places.from_last[c];
         for (uint32_t l = 0; l < lanes; ++l) {
             const float rx = b.x[l] - p.x, ry = b.y[l] - p.y, rz = b.z[l] - p.z;
             const float h = dot<fused>(p.nx, p.ny, p.nz, rx, ry, rz), d2 = dot<fused>(rx, ry, rz, rx, ry, rz);
             const float u2 = madd<fused>(flatten * h, h, d2) * p.inverse;
-            const int32_t missed = u2 < 1 ? 0 : -1, here = (int32_t(bits_of(d2 * p.recede)) & distance_bits) | int32_t(c), word = (here | missed) & no_word;
-            bits[l] |= bit & ~uint32_t(missed), nearest[l] = word < nearest[l] ? word : nearest[l], least[l] = lesser(u2, least[l]);
+            const int32_t reached = u2 < 1 ? -1 : 0, word = ((~int32_t(bits_of(d2 * p.recede)) & distance_bits) | from_last) & reached;
+            bits[l] |= bit & uint32_t(reached), nearest[l] = word > nearest[l] ? word : nearest[l], least[l] = lesser(u2, least[l]);
         }
     }
     for (uint32_t l = 0; l < lanes; ++l) out.bits[l] = bits[l], out.nearest[l] = nearest[l], out.u2[l] = least[l];
 }
 
 /// The nearest point among those with weight, of the candidates: which, its normal and its 1/R². Lists who has weight
-/// anywhere, at most `most_listed`; returns how many there are.
+/// anywhere, and returns how many there are; beyond `most_listed` no more than a block of them.
 template <bool fused>
 RILL_INLINE uint32_t find_nearest(const Field& f, const uint32_t* candidates, uint32_t count, uint32_t* list, Batch& b,
                                   int32_t* found, float* inverse) {
     Reached reached;
     alignas(64) int32_t nearest[lanes];
     alignas(64) float least[lanes];
-    for (uint32_t l = 0; l < lanes; ++l) nearest[l] = no_word, found[l] = 0, least[l] = unsupported;
+    for (uint32_t l = 0; l < lanes; ++l) nearest[l] = 0, found[l] = 0, least[l] = unsupported;
     uint32_t listed = 0;
-    for (uint32_t first = 0; first < count; first += uint32_t(block)) {
-        find_reached<fused>(f, candidates + first, count - first < uint32_t(block) ? count - first : uint32_t(block), b, reached);
+    for (uint32_t first = 0; first < count; first += listing_block) {
+        find_reached<fused>(f, candidates + first, count - first < listing_block ? count - first : listing_block, b, reached);
         for (uint32_t l = 0; l < lanes; ++l) {
-            const int32_t word = reached.nearest[l] | place_bits, place = int32_t(first) + (reached.nearest[l] & place_bits);
-            const int32_t nearer = word < nearest[l] ? -1 : 0;
-            found[l] = (place & nearer) | (found[l] & ~nearer), nearest[l] = (word & nearer) | (nearest[l] & ~nearer);
+            const int32_t word = reached.nearest[l] & distance_bits, place = int32_t(first) + place_bits - (reached.nearest[l] & place_bits);
+            const int32_t nearer = word > nearest[l] ? -1 : 0;
+            found[l] = (place & nearer) | (found[l] & ~nearer), nearest[l] = word > nearest[l] ? word : nearest[l];
             least[l] = lesser(reached.u2[l], least[l]);
         }
-        for (uint32_t some = word_of(reached.bits); some; some &= some - 1, ++listed)
-            if (listed < most_listed) list[listed] = candidates[first + lowest_bit(some)];
+        for (uint32_t some = listed > most_listed ? 0 : word_of(reached.bits); some; some &= some - 1) list[listed++] = candidates[first + lowest_bit(some)];
     }
     for (uint32_t l = 0; l < lanes; ++l) {
         const Patch& p = f.patches[candidates[found[l]]];
