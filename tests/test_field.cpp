@@ -3,6 +3,7 @@
 // points do to it.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "field_harness.h"
+#include "surface/field_kernels.h"
 
 using namespace field_test;
 
@@ -96,6 +97,33 @@ TEST_CASE("thin: a sheet keeps both sides, and so does a gap") {
             }
             CHECK(wrong == 0);
         }
+}
+
+TEST_CASE("the winding number of many points is the sum of all their discs, and the distance that to the nearest") {
+    // More than 256 sixteens of points, which are looked through sixteen groups at a time.
+    Cloud cloud;
+    add(cloud, sphere_of(1), 0.03);
+    add(cloud, torus_of(1.5, 0.2), 0.05);
+    const RealField real(cloud);
+    const surface::Field& f = real.field;
+    REQUIRE(f.groups.count > 2 * surface::lanes);
+    Random random(18);
+    double worst = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const Vec p = (0.1 + 2 * random()) * random.direction();
+        double sum = 0, nearest2 = 1e30;
+        for (uint32_t k = 0; k < f.point_count; ++k) {
+            const Vec r = Vec{f.x[k], f.y[k], f.z[k]} - p;
+            const double d2 = dot(r, r) + 1e-20;
+            sum += f.area[k] * dot(Vec{f.nx[k], f.ny[k], f.nz[k]}, r) / (d2 * std::sqrt(d2)), nearest2 = std::min(nearest2, d2);
+        }
+        float distance2;
+        const double winding = f.kernels->winding(f, float(p[0]), float(p[1]), float(p[2]), distance2);
+        worst = std::max(worst, std::abs(winding - sum) / (1 + std::abs(sum)));
+        if (nearest2 < 0.01) CHECK(distance2 == doctest::Approx(nearest2).epsilon(1e-3));
+    }
+    MESSAGE("at most ", worst, " off");
+    CHECK(worst < 0.06);
 }
 
 TEST_CASE("thin: at the rim of a sheet the winding number takes back what patches say beyond it") {

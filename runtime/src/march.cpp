@@ -39,7 +39,7 @@ uint32_t list_corners(MesherScratch& s, const Tile& tile, const uint16_t (&rows)
     for (uint32_t a = 0; a < 3; ++a)
         for (int k = 0; k < tile_corners; ++k) place[a][k] = corner_at(tile, a, k);
     uint32_t n = 0;
-    for (uint32_t octant = 0; octant < 8; ++octant) {
+    for (const uint32_t octant : {0u, 1u, 3u, 2u, 6u, 7u, 5u, 4u}) {  // each beside the one before
         const uint32_t first_x = octant & 1 ? 5 : 0, first_y = octant & 2 ? 5 : 0, first_z = octant & 4 ? 5 : 0;
         const uint32_t last_y = first_y ? 9 : 5, last_z = first_z ? 9 : 5;
         for (uint32_t z = first_z; z < last_z; ++z) {

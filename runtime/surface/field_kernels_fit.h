@@ -128,8 +128,9 @@ RILL_INLINE void find_neighbours(const Field& f, uint32_t bundle, Nearest& found
         if (b != bundle) search.offer_all(lanes * b, lower, upper);
     float low[3], high[3];
     for (int a = 0; a < 3; ++a) low[a] = lower[a] - search.reach, high[a] = upper[a] + search.reach;
-    for_touching(f, low, high, [&](uint32_t p) RILL_INLINED {
-        if (p < lanes * from || p > lanes * to) search.offer_all(p, lower, upper);
+    for_touching(f, low, high, [&](const uint32_t* bundles, uint32_t count) RILL_INLINED {
+        for (uint32_t k = 0; k < count; ++k)
+            if (bundles[k] < from || bundles[k] > to) search.offer_all(lanes * bundles[k], lower, upper);
     });
     found.beyond = search.beyond;
     for (uint32_t k = 0; k < most_neighbours; ++k)

@@ -66,11 +66,12 @@ RILL_INLINE float inverse_of(float x) {
 alignas(64) constexpr uint32_t bit_of_lane[lanes] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
                                                     1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
 
-/// Bits to a word. (A sum in one loop would not become vectors.)
-RILL_INLINE uint32_t word_of(uint32_t (&bit)[lanes]) {
-    for (uint32_t l = 0; l < 8; ++l) bit[l] |= bit[l + 8];
-    for (uint32_t l = 0; l < 4; ++l) bit[l] |= bit[l + 4];
-    return bit[0] | bit[1] | bit[2] | bit[3];
+/// Bits to a word.
+RILL_INLINE uint32_t word_of(const uint32_t (&bit)[lanes]) {
+    uint64_t pair[lanes / 2];
+    std::memcpy(pair, bit, sizeof(pair));
+    const uint64_t all = ((pair[0] | pair[1]) | (pair[2] | pair[3])) | ((pair[4] | pair[5]) | (pair[6] | pair[7]));
+    return uint32_t(all | all >> 32);
 }
 
 RILL_INLINE float least_of(const float* of) {
