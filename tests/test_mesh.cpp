@@ -391,6 +391,22 @@ TEST_CASE("where a part of the points crosses more tiles than it has room for, t
     }
 }
 
+TEST_CASE("numbers of points that take more than sixteen bits") {
+    Cloud cloud;
+    for (const double x : {-4, -3}) add_sphere(cloud, {x, x, x}, 0.02, 40000);
+    add_sphere(cloud, {0, 0, 0}, 1, 500);
+    const RealField real(cloud);
+    REQUIRE(real.field.x[UINT16_MAX] < -2);  // the ball's come after
+    const Mesh m = mesh(real.field, {.cell = 0.1f});
+    CHECK(topology(m).closed_manifold());
+    size_t of_ball = 0;
+    double worst = 0;
+    for (uint32_t v = 0; v < m.vertex_count(); ++v)
+        if (length(m.at(v)) < 2) ++of_ball, worst = std::max(worst, length(m.normal_at(v) - m.at(v)));
+    CHECK(of_ball > 1500);
+    CHECK(worst < 0.02);
+}
+
 TEST_CASE("nothing in, nothing out") {
     Cloud cloud;
     const RealField real(cloud);

@@ -50,13 +50,14 @@ struct Tile {
     uint8_t speck[rows_per_tile];    ///< corners that begin a piece which is noise; the tile's own, as cells
     bool has_specks;
     float lower[3], upper[3];        ///< of its vertices, and of all that its triangles use
+    bool keeps_candidates() const { return candidate_count <= kept_candidates; }
     Beside at_place(uint32_t place) const { return Beside(beside >> (2 * place) & 3); }
     union {
         float value[corners_per_tile];  ///< until the vertices are placed
         PlacedCells placed;
     };
-    uint32_t candidate_count;        ///< as MesherScratch's
-    uint32_t candidates[kept_candidates];  ///< unless there are more
+    uint32_t candidate_count;
+    uint16_t candidates[kept_candidates];  ///< unless there are more, or larger numbers among them: keeps_candidates()
 };
 
 /// Faces spanned by corners x and x + 1 of the rows: both signs present.

@@ -149,12 +149,14 @@ void gather_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) {
 
 void list_candidates(const Mesher& m, MesherScratch& s, Tile& tile) noexcept {
     gather_candidates(m, s, tile);
-    tile.candidate_count = s.candidate_count;
-    if (s.candidate_count <= Tile::kept_candidates) std::copy(s.candidates, s.candidates + s.candidate_count, tile.candidates);
+    const uint32_t count = s.candidate_count;
+    const bool fits = count == 0 || (count <= Tile::kept_candidates && s.candidates[count - 1] <= UINT16_MAX);  // they ascend
+    tile.candidate_count = fits ? count : ~0u;
+    if (tile.keeps_candidates()) std::copy(s.candidates, s.candidates + count, tile.candidates);
 }
 
 void take_candidates(const Mesher& m, MesherScratch& s, const Tile& tile) noexcept {
-    if (tile.candidate_count > Tile::kept_candidates) {
+    if (!tile.keeps_candidates()) {
         gather_candidates(m, s, tile);
         return;
     }
