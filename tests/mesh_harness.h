@@ -186,6 +186,7 @@ struct Setup {
     std::vector<std::array<float, 4>> eyes{};  ///< position, reach
     const FieldAccess* access = nullptr;
     bool streams = true;
+    int rounds_until_late = 0;  ///< 0: never
 };
 
 inline Mesh mesh(const surface::Field& field, const Setup& setup) {
@@ -218,7 +219,10 @@ inline Mesh mesh(const surface::Field& field, const Setup& setup) {
         std::copy(eye.begin(), eye.begin() + 3, levels.eyes[levels.eye_count]);
         levels.reach[levels.eye_count++] = eye[3];
     }
-    begin_mesh(mesher, {&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, &target});
+    MeshInput input{&field, levels, setup.views.data(), uint32_t(setup.views.size()), true, &target};
+    int rounds = setup.rounds_until_late;
+    if (rounds) input.most_octaves = 3, input.user = &rounds, input.late = [](void* left) { return --*static_cast<int*>(left) == 0; };
+    begin_mesh(mesher, input);
     uint32_t count;
     const Stage* stages = mesh_stages(&count);
     if (setup.workers > 1)

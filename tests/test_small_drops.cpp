@@ -127,6 +127,20 @@ TEST_CASE("small drops that touch something are the cells': joined to other liqu
     CHECK(hash(mesh(real.field, {.cell = 0.06f})) == hash(m));
 }
 
+TEST_CASE("a frame that is late has the mesh of the larger cells that it gives way to, drops too small for these included") {
+    Cloud cloud = sphere_cloud(500);
+    for (int i = 0; i < 20; ++i) cloud.add_drop({0.3 * i - 3, 2, 0.013 * i}, {0.07, 0.08, 0.06 + 0.003 * i});  // some three cells, then one and a half
+    const RealField real(cloud);
+    const Mesh larger = mesh(real.field, {.cell = 0.1f});
+    for (const int rounds : {1, 2, 3}) {
+        const Mesh late = mesh(real.field, {.cell = 0.05f, .rounds_until_late = rounds});
+        CHECK(late.counts.cut == cut_time);
+        CHECK(late.position == larger.position);
+        CHECK(late.indices == larger.indices);
+    }
+    CHECK(mesh(real.field, {.cell = 0.05f}).position != larger.position);
+}
+
 TEST_CASE("small drops out of sight are not drawn, and what is far and tiny neither") {
     Cloud cloud;
     for (int i = 0; i < 100; ++i) cloud.add_drop({0.5 * i, 0, 0}, {0.03, 0.03, 0.03});
