@@ -167,6 +167,9 @@ TEST_CASE("bench: no allocation in frames, one output whatever the order and the
     CHECK(json["scaling"][0]["speedup"] == 1);
     CHECK(json["scaling"][1]["speedup"].get<double>() > 0);
     CHECK(json["scaling"][1]["two_players_at_once"].get<double>() > 0);
+    REQUIRE(json["larger_cells"].size() == 4);
+    CHECK(json["larger_cells"][0]["share"] == 1);
+    for (const nlohmann::json& cells : json["larger_cells"]) CHECK(cells["mean_us"].get<double>() > 0);
     const nlohmann::json& draco = json["draco"];
     CHECK(draco["triangles_per_second"].get<double>() > 0);
     CHECK(draco["rill_over_draco"].get<double>() == doctest::Approx(draco["mean_us"].get<double>() / draco["rill_mean_us"].get<double>()));

@@ -133,6 +133,7 @@ struct Report {
     std::vector<Pass> details;  ///< less of it, or coarser
     uint64_t allocations_until_created = 0, peak_bytes = 0, bytes_read = 0;
     BesideDraco draco;
+    std::array<double, cell_sizes> larger_cells{};  ///< microseconds, from the source's on
     std::vector<SideBySide> scaling;  ///< by workers, from 1
     double two_at_once = 0;
     std::vector<ScreenError> far;
@@ -169,6 +170,7 @@ void measure_single(Report& report, BenchPlayer& player, const std::vector<uint3
     player.look(0, false);
     report.peak_bytes = player.peak_bytes();
     report.draco = beside_draco(player, frames);
+    report.larger_cells = beside_larger_cells(player, frames);
     report.far = screen_errors(player, frames);
     report.camera = camera_jumps(player, frames);
     player.look(0, false);
@@ -184,7 +186,9 @@ void measure_several(Report& report, BenchPlayer& single, const std::string& ass
 }
 
 nlohmann::json to_json(const Report& report, const AssetDirectory& directory, const std::string& asset, size_t frames) {
-    nlohmann::json passes = nlohmann::json::array(), scaling = nlohmann::json::array(), screen = nlohmann::json::array();
+    nlohmann::json passes = nlohmann::json::array(), scaling = nlohmann::json::array(), screen = nlohmann::json::array(), cells = nlohmann::json::array();
+    for (size_t k = 0; k < cell_sizes; ++k)
+        cells.push_back({{"times_as_large", 1 << k}, {"mean_us", report.larger_cells[k]}, {"share", report.larger_cells[k] / report.larger_cells[0]}});
     for (const auto* list : {&report.passes, &report.details})
         for (const Pass& pass : *list) passes.push_back(to_json(pass));
     for (size_t i = 0; i < report.scaling.size(); ++i)
@@ -210,6 +214,7 @@ nlohmann::json to_json(const Report& report, const AssetDirectory& directory, co
             {"output_identical", report.same()},
             {"passes", passes},
             {"scaling", scaling},
+            {"larger_cells", cells},
             {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
             {"camera_jumps",
              {{"moves", camera.moves},
@@ -250,6 +255,9 @@ void print(const Report& report) {
     for (size_t i = 1; i < report.scaling.size(); ++i)
         std::printf("%zu workers beside one, frame by frame: %.1f ms for %.1f, %.2f times as fast\n", i + 1, report.scaling[i].other / 1000,
                     report.scaling[i].one / 1000, report.scaling[i].ratio());
+    const auto& cells = report.larger_cells;
+    std::printf("cells twice, four and eight times as large, frame by frame: %.1f, %.1f and %.1f %% of a frame\n", 100 * cells[1] / cells[0], 100 * cells[2] / cells[0],
+                100 * cells[3] / cells[0]);
     if (report.two_at_once > 0) std::printf("two players of one worker each, at once: %.2f times the frames of one alone\n", report.two_at_once);
     const BesideDraco& draco = report.draco;
     if (draco.triangles > 0)

@@ -17,16 +17,24 @@ double microseconds_of(const Work& work) {
     return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Three rounds through the clip. `one` and `other`: place in the clip → microseconds.
+/// Three rounds through the clip. `measure`: which of them, place in the clip → microseconds.
+template <size_t count, class Measure>
+std::array<double, count> in_turns(size_t frames, const Measure& measure) {
+    constexpr int rounds = 3;
+    std::array<double, count> none, mean{};
+    none.fill(1e30);
+    std::vector<std::array<double, count>> best(frames, none);
+    for (int round = 0; round < rounds; ++round)
+        for (size_t i = 0; i < frames; ++i)
+            for (size_t k = 0; k < count; ++k) best[i][k] = std::min(best[i][k], measure(k, i));
+    for (const auto& frame : best)
+        for (size_t k = 0; k < count; ++k) mean[k] += frame[k] / double(frames);
+    return mean;
+}
 template <class One, class Other>
 SideBySide side_by_side(size_t frames, const One& one, const Other& other) {
-    constexpr int rounds = 3;
-    std::vector<SideBySide> best(frames, {1e30, 1e30});
-    for (int round = 0; round < rounds; ++round)
-        for (size_t i = 0; i < frames; ++i) best[i] = {std::min(best[i].one, one(i)), std::min(best[i].other, other(i))};
-    SideBySide mean;
-    for (const SideBySide& frame : best) mean.one += frame.one / double(frames), mean.other += frame.other / double(frames);
-    return mean;
+    const auto [first, second] = in_turns<2>(frames, [&](size_t k, size_t i) { return k ? other(i) : one(i); });
+    return {first, second};
 }
 
 BenchFrame show(BenchPlayer& player, uint32_t frame) { return player.play(player.seconds_of(frame), 1); }
@@ -50,6 +58,15 @@ BesideDraco beside_draco(BenchPlayer& single, const std::vector<uint32_t>& frame
             return double(processor_microseconds() - start);
         });
     return draco;
+}
+
+std::array<double, cell_sizes> beside_larger_cells(BenchPlayer& single, const std::vector<uint32_t>& frames) {
+    const auto times = in_turns<cell_sizes>(frames.size(), [&](size_t k, size_t i) {
+        single.look(single.info().cell_size * float(1 << k), false);
+        return double(show(single, frames[i]).microseconds[stage_processor]);
+    });
+    single.look(0, false);
+    return times;
 }
 
 SideBySide beside_one_worker(BenchPlayer& single, BenchPlayer& player, const std::vector<uint32_t>& frames) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The runtime beside others, frame by frame: what is a ratio is measured in turns, so that both meet the machine in the same mood.
 #pragma once
+#include <array>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct BesideDraco {
     double rill_over_draco() const { return times.one > 0 ? times.other / times.one : 0; }
 };
 BesideDraco beside_draco(BenchPlayer& single, const std::vector<uint32_t>& frames);
+
+/// One worker going forward with cells of the source's size, twice, four and eight times as large: processor time of each.
+inline constexpr size_t cell_sizes = 4;
+std::array<double, cell_sizes> beside_larger_cells(BenchPlayer& single, const std::vector<uint32_t>& frames);
 
 /// One worker, and as many as `player` has, going forward, by the clock.
 SideBySide beside_one_worker(BenchPlayer& single, BenchPlayer& player, const std::vector<uint32_t>& frames);
