@@ -133,7 +133,7 @@ struct Report {
     std::vector<Pass> details;  ///< less of it, or coarser
     uint64_t allocations_until_created = 0, peak_bytes = 0, bytes_read = 0;
     BesideDraco draco;
-    std::array<double, cell_sizes> larger_cells{};  ///< microseconds, from the source's on
+    BesideCells larger_cells;
     std::vector<SideBySide> scaling;  ///< by workers, from 1
     double two_at_once = 0;
     std::vector<ScreenError> far;
@@ -187,8 +187,8 @@ void measure_several(Report& report, BenchPlayer& single, const std::string& ass
 
 nlohmann::json to_json(const Report& report, const AssetDirectory& directory, const std::string& asset, size_t frames) {
     nlohmann::json passes = nlohmann::json::array(), scaling = nlohmann::json::array(), screen = nlohmann::json::array(), cells = nlohmann::json::array();
-    for (size_t k = 0; k < cell_sizes; ++k)
-        cells.push_back({{"times_as_large", 1 << k}, {"mean_us", report.larger_cells[k]}, {"share", report.larger_cells[k] / report.larger_cells[0]}});
+    for (size_t k = 0; k < BesideCells::sizes; ++k)
+        cells.push_back({{"times_as_large", 1 << k}, {"mean_us", report.larger_cells.times[k]}, {"share", report.larger_cells.share(k)}});
     for (const auto* list : {&report.passes, &report.details})
         for (const Pass& pass : *list) passes.push_back(to_json(pass));
     for (size_t i = 0; i < report.scaling.size(); ++i)
@@ -255,9 +255,9 @@ void print(const Report& report) {
     for (size_t i = 1; i < report.scaling.size(); ++i)
         std::printf("%zu workers beside one, frame by frame: %.1f ms for %.1f, %.2f times as fast\n", i + 1, report.scaling[i].other / 1000,
                     report.scaling[i].one / 1000, report.scaling[i].ratio());
-    const auto& cells = report.larger_cells;
-    std::printf("cells twice, four and eight times as large, frame by frame: %.1f, %.1f and %.1f %% of a frame\n", 100 * cells[1] / cells[0], 100 * cells[2] / cells[0],
-                100 * cells[3] / cells[0]);
+    const BesideCells& cells = report.larger_cells;
+    std::printf("cells twice, four and eight times as large, frame by frame: %.1f, %.1f and %.1f %% of a frame\n", 100 * cells.share(1), 100 * cells.share(2),
+                100 * cells.share(3));
     if (report.two_at_once > 0) std::printf("two players of one worker each, at once: %.2f times the frames of one alone\n", report.two_at_once);
     const BesideDraco& draco = report.draco;
     if (draco.triangles > 0)

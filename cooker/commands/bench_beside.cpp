@@ -60,13 +60,13 @@ BesideDraco beside_draco(BenchPlayer& single, const std::vector<uint32_t>& frame
     return draco;
 }
 
-std::array<double, cell_sizes> beside_larger_cells(BenchPlayer& single, const std::vector<uint32_t>& frames) {
-    const auto times = in_turns<cell_sizes>(frames.size(), [&](size_t k, size_t i) {
+BesideCells beside_larger_cells(BenchPlayer& single, const std::vector<uint32_t>& frames) {
+    const BesideCells cells{in_turns<BesideCells::sizes>(frames.size(), [&](size_t k, size_t i) {
         single.look(single.info().cell_size * float(1 << k), false);
         return double(show(single, frames[i]).microseconds[stage_processor]);
-    });
+    })};
     single.look(0, false);
-    return times;
+    return cells;
 }
 
 SideBySide beside_one_worker(BenchPlayer& single, BenchPlayer& player, const std::vector<uint32_t>& frames) {

@@ -25,8 +25,12 @@ struct BesideDraco {
 BesideDraco beside_draco(BenchPlayer& single, const std::vector<uint32_t>& frames);
 
 /// One worker going forward with cells of the source's size, twice, four and eight times as large: processor time of each.
-inline constexpr size_t cell_sizes = 4;
-std::array<double, cell_sizes> beside_larger_cells(BenchPlayer& single, const std::vector<uint32_t>& frames);
+struct BesideCells {
+    static constexpr size_t sizes = 4;
+    std::array<double, sizes> times{};
+    double share(size_t size) const { return times[0] > 0 ? times[size] / times[0] : 0; }
+};
+BesideCells beside_larger_cells(BenchPlayer& single, const std::vector<uint32_t>& frames);
 
 /// One worker, and as many as `player` has, going forward, by the clock.
 SideBySide beside_one_worker(BenchPlayer& single, BenchPlayer& player, const std::vector<uint32_t>& frames);

@@ -11,6 +11,7 @@ namespace rill::surface::inner {
 
 // Level by level, all of one before any of the next: a loop over what was found in each sixteen ends where no machine foresees it, and
 // what follows had to wait for that.
+
 /// Bits of the lanes of as many sixteens.
 using SixteenBits = uint32_t[lanes][lanes];
 /// The numbers of the bits set, of `count` sixteens that begin at 16 × sixteens[k]; returns how many.
@@ -83,7 +84,7 @@ RILL_INLINE uint32_t gather(const Field& f, const float lower[3], const float up
     for_touching(f, lower, upper, [&](const uint32_t* bundles, uint32_t count) RILL_INLINED {
         alignas(64) SixteenBits bit;
         uint32_t some[lanes * lanes];
-        for (; count; ) {
+        while (count) {
             const uint32_t now = count < lanes ? count : lanes;
             find_reaching<fused>(f, bundles, now, lower, upper, bit);
             const uint32_t listed = list_bits(bit, bundles, now, some), room = found < capacity ? capacity - found : 0;
