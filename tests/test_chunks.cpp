@@ -485,6 +485,36 @@ TEST_CASE("slip left to the neighbours is its own where there are none, and neve
     CHECK(all_numbers(decode(lone.bytes.data(), lone.bytes.size(), lone.shape).block) == expected_numbers(tracks));
 }
 
+TEST_CASE("evaluation: drops shrink over a whole step, those of one sample over half of one") {
+    std::mt19937 random(3);
+    std::vector<QuantisedTrack> tracks;
+    for (const auto& [birth, death] : {std::pair{4u, 9u}, {15u, 15u}}) tracks.push_back(quantise_track(make_track(random, birth, death, true), quantiser, origin, tables()));
+    const EncodedChunk chunk = encode(tracks);
+    const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
+    REQUIRE(d.status == Status::ok);
+    std::vector<float> memory(13 * 2);
+    std::vector<uint64_t> rows_memory(time_rows_bytes(window) / 8 + 1);
+    const auto activity = [&](double s) {  // of the only one there
+        format::DropSet drops{};
+        float** const streams[] = {&drops.x,        &drops.y,        &drops.z,        &drops.shape[0], &drops.shape[1], &drops.shape[2], &drops.shape[3],
+                                   &drops.shape[4], &drops.shape[5], &drops.vx,       &drops.vy,       &drops.vz,       &drops.activity};
+        for (int i = 0; i < 13; ++i) *streams[i] = memory.data() + 2 * i;
+        format::PointSet points{};
+        TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, 24);
+        const uint32_t counted = count_active(rows, d.block, 0, 2);
+        CHECK(evaluate_tracks(rows, d.block, 0, 2, 0, 2, points, drops) == counted);
+        CHECK(counted <= 1);
+        return counted ? drops.activity[0] : 0.f;
+    };
+    CHECK(activity(6.3) == 1);
+    CHECK(activity(3.25) == doctest::Approx(0.25));
+    CHECK(activity(9.75) == doctest::Approx(0.25));
+    CHECK(activity(10) == 0);
+    CHECK(activity(15) == 1);
+    CHECK(activity(14.75) == doctest::Approx(0.5));
+    CHECK(activity(15.5) == 0);
+}
+
 TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact velocity") {
     std::mt19937 random(2);
     std::vector<TrackSamples> truth;
@@ -529,12 +559,13 @@ TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact veloc
         CHECK(evaluate(s, 1, points) == expected);  // too small: told how many
         CHECK(points.count == std::min(expected, 1u));
     }
-    CHECK(evaluate(2.25, 4, points) == 2);  // the second is on its way in
-    CHECK(*std::min_element(points.activity, points.activity + 2) == doctest::Approx(0.25));
-    CHECK(evaluate(2.0, 4, points) == 1);
-    CHECK(evaluate(9.75, 4, points) == 3);
-    CHECK(*std::min_element(points.activity, points.activity + 3) == doctest::Approx(0.25));
-    // A life of one sample fades on both sides, and within half a step.
+    CHECK(evaluate(2.75, 4, points) == 2);  // the second is on its way in
+    CHECK(*std::min_element(points.activity, points.activity + 2) == doctest::Approx(0.5));
+    CHECK(evaluate(2.5, 4, points) == 1);  // in the middle between two frames only who lives through both
+    CHECK(evaluate(9.125, 4, points) == 3);
+    CHECK(*std::min_element(points.activity, points.activity + 3) == doctest::Approx(0.75));
+    CHECK(evaluate(9.5, 4, points) == 2);
+    // A life of one sample fades on both sides.
     for (const double s : {19.75, 20.25}) {
         CHECK(evaluate(s, 4, points) == 3);
         CHECK(*std::min_element(points.activity, points.activity + 3) == doctest::Approx(0.5));

@@ -85,6 +85,35 @@ TEST_CASE("verify: meets its target, and says so in JSON and HTML") {
     CHECK(run_rill("verify " + clip().asset + " " + clip().input + " --frames 4:9").code == 2);
 }
 
+TEST_CASE("verify: frames between the asset's are held against the moment between, without a target") {
+    const TestFolder folder;
+    const std::string input = folder / "in", asset = folder / "half.rill";
+    for (int number = 3; number <= 8; ++number) {
+        Mesh mesh = bumpy_sphere(32, 0.5f, {0.1f * float(number), 0, 0.5f});
+        mesh.velocities.assign(mesh.positions.size(), {2.4f, 0, 0});
+        put_file(input + "/f" + std::to_string(number) + ".ply", plain_ply(mesh));
+    }
+    REQUIRE(run_rill("cook " + input + " -o " + asset + " --error 0.4e --frames 3:7:2").code == 0);
+    const Result result = run_rill("verify " + asset + " " + input + " --frames 4:6:2 --json " + (folder / "v.json"));
+    CAPTURE(result.text);
+    CHECK(result.code == 0);
+    CHECK(has(result, "2 of them lie between"));
+    const nlohmann::json json = json_of(folder / "v.json");
+    REQUIRE(json.is_object());
+    REQUIRE(json["frames"].size() == 2);
+    CHECK(json["frames"][1]["frame"] == 6);
+    CHECK(json["frames"][1]["between"] == true);
+    CHECK(json["frames"][1]["seconds"].get<double>() == doctest::Approx(3 / 24.0));
+    CHECK(json["target"].is_null());
+    CHECK(json["summary"]["p99_m"].get<double>() < 0.06);  // a frame off, where the ball goes straight on, would be .1
+    const Result own = run_rill("verify " + asset + " " + input + " --json -");
+    CHECK(has(own, "\"between\": false"));
+    CHECK_FALSE(has(own, "\"between\": true"));
+    CHECK(has(own, "\"met\": true"));
+    CHECK(run_rill("verify " + asset + " " + input + " --frames 4:8:2").code == 2);  // 8 is after its last
+    CHECK(run_rill("verify " + asset + " " + input + " --frames 4:6:2 --substeps 2").code == 2);
+}
+
 TEST_CASE("verify: another surface than the one cooked misses the target: 3") {
     const TestFolder folder;
     for (int number = 3; number <= 8; ++number) {

@@ -18,11 +18,20 @@ double AssetDirectory::diagonal() const {
     return std::sqrt(sum);
 }
 
-uint32_t AssetDirectory::index_of(int number) const {
-    for (uint32_t i = 0; i < header.frame_count; ++i)
-        if (frame_number(i) == number) return i;
+double AssetDirectory::place_of(int number) const {
+    for (uint32_t i = 0; i < header.frame_count; ++i) {
+        const int here = frame_number(i), before = i ? frame_number(i - 1) : here;
+        if (number == here) return i;
+        if (before < number && number < here) return i - double(here - number) / (here - before);
+    }
     throw InputError(path + ": has no frame " + std::to_string(number) + ": it holds " + std::to_string(frame_number(0)) + " to " +
                      std::to_string(frame_number(header.frame_count - 1)) + " by " + std::to_string(header.frame_step));
+}
+
+uint32_t AssetDirectory::index_of(int number) const {
+    const double place = place_of(number);
+    if (place == std::floor(place)) return uint32_t(place);
+    throw InputError(path + ": has no frame " + std::to_string(number) + ", but others before and after it");
 }
 
 namespace {

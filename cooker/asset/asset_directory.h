@@ -20,6 +20,8 @@ struct AssetDirectory {
         return numbers.empty() ? header.first_frame + int(index) * header.frame_step : numbers.at(index);
     }
     uint32_t index_of(int number) const;  ///< throws InputError when the asset has no such frame
+    /// Index of a frame, or where it lies between two by its number. Throws InputError when it is none of those between first and last.
+    double place_of(int number) const;
     double diagonal() const;  ///< of the sequence's bounds, metres
 };
 /// Throws InputError naming the file and what is wrong with it.

@@ -19,7 +19,7 @@ struct Basis {
     Basis(const format::BasisTables& tables, uint32_t life, bool plain)
         : samples(life), terms(format::most_terms(life, plain)), cosine(plain), row(life) {
         for (uint32_t s = 0; s < samples; ++s)
-            format::basis_row(tables, samples, cosine, s, terms, row[s].data(), nullptr);
+            format::basis_row(tables, samples, cosine, s, terms, row[s].data());
     }
 };
 

@@ -391,7 +391,7 @@ TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quan
     const float* second = coefficients.data() + 3 * record.position_terms;
     for (uint32_t s = 0; s < life; ++s) {
         float phi[max_terms], x[3] = {}, y[6] = {};
-        format::basis_row(tables, life, record.flags & format::track_cosine, s, terms, phi, nullptr);
+        format::basis_row(tables, life, record.flags & format::track_cosine, s, terms, phi);
         for (uint32_t k = 0; k < record.position_terms; ++k)
             for (uint32_t c = 0; c < 3; ++c) x[c] += phi[k] * coefficients[3 * k + c];
         for (uint32_t k = 0; k < record.second_terms; ++k)

@@ -36,6 +36,8 @@ void print_summary(const Verification& v) {
     const FrameMeasure& worst = v.frames[v.worst];
     std::printf("%zu frames: mean %.4f %%, p99 %.4f %%, max %.4f %% of the diagonal (%.4g m); p99 %.3f edges (of %.4g m); normals %.2f°\n",
                 v.frames.size(), v.mean * percent, v.p99 * percent, v.max * percent, v.diagonal, v.p99 * edges, v.edge, v.normal_degrees);
+    if (const auto between = std::count_if(v.frames.begin(), v.frames.end(), [](const FrameMeasure& f) { return f.between; }))
+        std::printf("%td of them lie between the asset's own frames, of which alone an error was promised\n", between);
     std::printf("worst frame %d: p99 %.4f %%, max %.4f %%; %s per frame\n", worst.number, worst.distance.p99 * percent,
                 worst.distance.max * percent, readable_bytes(v.bytes_per_frame).c_str());
 }

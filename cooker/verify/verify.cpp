@@ -103,6 +103,13 @@ std::unique_ptr<SequenceReader> closed_as_told(const nlohmann::json& stored, con
     }
 }
 
+bool is_between(double place) { return place != std::floor(place); }
+double seconds_at(const AssetPlayer& player, double place) {
+    const uint32_t before = uint32_t(place);
+    const double seconds = player.frame_seconds(before);
+    return is_between(place) ? seconds + (place - before) * (player.frame_seconds(before + 1) - seconds) : seconds;
+}
+
 /// JSON knows no infinity.
 nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 double number(const nlohmann::json& json) { return json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>(); }
@@ -151,8 +158,8 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
                     const std::function<void(uint32_t, uint32_t)>& progress, Scrutiny scrutiny) {
     const AssetDirectory directory = read_directory(asset);
     const std::vector<int>& numbers = source.info().numbers;
-    std::vector<uint32_t> index;
-    for (int number : numbers) index.push_back(directory.index_of(number));
+    std::vector<double> places;
+    for (int number : numbers) places.push_back(directory.place_of(number));
     Verification result;
     result.asset = asset, result.input = source.info().path;
     result.diagonal = directory.diagonal();
@@ -160,7 +167,7 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     result.bytes_per_frame = double(directory.header.file_bytes) / directory.header.frame_count;
     const bool details = result.details = scrutiny == Scrutiny::close;
     const size_t stride = scrutiny == Scrutiny::glance ? 3 : 1;
-    read_target(result, directory.settings_json);
+    if (std::none_of(places.begin(), places.end(), is_between)) read_target(result, directory.settings_json);
     const SourceVelocity velocity = details ? velocity_of(source) : SourceVelocity{};
     // A run of neighbouring frames per task, one player each: its windows are decoded about once.
     const size_t run = run_length(numbers.size(), jobs);
@@ -171,10 +178,10 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     parallel_for((numbers.size() + run - 1) / run, jobs, [&](size_t part) {
         AssetPlayer player(asset);
         for (size_t i = part * run; i < std::min((part + 1) * run, numbers.size()); ++i) {
-            const double seconds = player.frame_seconds(index[i]);
+            const double seconds = seconds_at(player, places[i]);
             FrameMeasure frame = details ? measure_closely(velocity.known ? source.read(i) : source.read_surface(i), velocity, player, seconds, result.edge)
                                          : measure_plainly(source.read_surface(i), player, seconds, result.edge, stride);
-            frame.number = numbers[i], frame.seconds = seconds;
+            frame.number = numbers[i], frame.seconds = seconds, frame.between = is_between(places[i]);
             const std::lock_guard lock(mutex);
             frames.put(i, std::move(frame));
             if (progress) progress(++done, uint32_t(numbers.size()));

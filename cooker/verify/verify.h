@@ -25,6 +25,7 @@ inline constexpr uint32_t coarser[] = {2, 4};
 struct FrameMeasure {
     int number = 0;              ///< the source's
     double seconds = 0;          ///< after the asset's first frame
+    bool between = false;        ///< two frames of the asset, which has not this one
     uint32_t source_triangles = 0, source_vertices = 0, decoded_triangles = 0;
     double edge = 0;             ///< median edge of the source frame, metres
     SurfaceDistance distance;
@@ -72,7 +73,7 @@ struct Verification {
     double diagonal = 0;         ///< of the asset's bounds, metres
     double edge = 0;             ///< the source's median edge as the asset states it, metres
     std::string target;          ///< the asset's own --error; empty when it states none
-    double target_p99 = 0;       ///< metres; 0 when it states none
+    double target_p99 = 0;       ///< metres; 0 when it states none, or when frames lie between the asset's: it is stated of these
     double mean = 0, p99 = 0, max = 0;  ///< metres, over the surface of all frames together
     double normal_degrees = 0;
     double bytes_per_frame = 0;
@@ -91,7 +92,8 @@ enum class Scrutiny {
 std::unique_ptr<SequenceReader> open_source_of(const std::string& asset, const std::string& input, ReadOptions read);
 /// The frames of an input, closed where the cook of `asset` closed them. Throws InputError when the asset cannot be read.
 std::unique_ptr<SequenceReader> closed_as_in(const std::string& asset, std::unique_ptr<SequenceReader> source);
-/// Every frame of the source against the asset. Throws InputError when the asset lacks one. jobs 0: all cores.
+/// Every frame of the source against the asset, at the moment between two of its frames where it has not that one. Throws InputError when
+/// a frame lies outside of it. jobs 0: all cores.
 Verification verify(const std::string& asset, const SequenceReader& source, int jobs,
                     const std::function<void(uint32_t done, uint32_t total)>& progress = {}, Scrutiny scrutiny = Scrutiny::plain);
 

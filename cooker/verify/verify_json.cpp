@@ -42,6 +42,7 @@ json coarse_json(const std::array<CoarseMeasure, 2>& measures) {
 json frame_json(const FrameMeasure& f, bool details) {
     json frame = {{"frame", f.number},
                   {"seconds", f.seconds},
+                  {"between", f.between},
                   {"mean_m", f.distance.mean},
                   {"p99_m", f.distance.p99},
                   {"max_m", f.distance.max},

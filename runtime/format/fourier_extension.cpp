@@ -32,33 +32,60 @@ constexpr auto table_offsets = [] {
     return offset;
 }();
 
-/// The functions before orthonormalisation and their derivatives by s, at s in [0, samples − 1].
-void plain_row(uint32_t samples, double s, uint32_t terms, double* g, double* dg) {
-    const double dx = samples > 1 ? 2.0 / (samples - 1) : 0.0;
-    const double x = samples > 1 ? s * dx - 1.0 : 0.0;
-    const double sine = std::sin(x * (pi / 2)), y = std::cos(x * (pi / 2));
-    const double dsine = y * (pi / 2) * dx, dz = -2 * sine * (pi / 2) * dx, z = 2 * y - 1;
-    g[0] = 1, dg[0] = 0;
-    if (terms > 1) g[1] = x, dg[1] = dx;
-    double t0 = 1, d0 = 0, t1 = z, d1 = dz;  // T_{k−1}, T_k and their derivatives
+/// The functions before orthonormalisation, at a sample.
+void plain_row(uint32_t samples, uint32_t sample, uint32_t terms, double* g) {
+    const double x = samples > 1 ? sample * (2.0 / (samples - 1)) - 1.0 : 0.0;
+    const double sine = std::sin(x * (pi / 2)), y = std::cos(x * (pi / 2)), z = 2 * y - 1;
+    g[0] = 1;
+    if (terms > 1) g[1] = x;
+    double t0 = 1, t1 = z;  // T_{k−1}, T_k
     for (uint32_t i = 2; i < terms; ++i) {
         if (i % 2 == 0) {
-            g[i] = t1, dg[i] = d1;
+            g[i] = t1;
         } else {
-            g[i] = sine * t0, dg[i] = dsine * t0 + sine * d0;
-            const double t2 = 2 * z * t1 - t0, d2 = 2 * (dz * t1 + z * d1) - d0;
-            t0 = t1, d0 = d1, t1 = t2, d1 = d2;
+            g[i] = sine * t0;
+            const double t2 = 2 * z * t1 - t0;
+            t0 = t1, t1 = t2;
         }
     }
 }
 
-void cosine_row(uint32_t samples, double s, uint32_t terms, double* value, double* derivative) {
-    const double step = pi / samples;
-    for (uint32_t k = 0; k < terms; ++k) {
-        const double scale = std::sqrt((k ? 2.0 : 1.0) / samples);
-        value[k] = scale * std::cos(step * k * (s + 0.5));
-        derivative[k] = -scale * step * k * std::sin(step * k * (s + 0.5));
+/// cos kθ by Chebyshev's recurrence: one cosine a sample, not one a term.
+void cosine_row(uint32_t samples, uint32_t sample, uint32_t terms, double* value) {
+    const double first = std::cos(pi * (sample + 0.5) / samples), scale = std::sqrt(2.0 / samples);
+    double t0 = scale, t1 = scale * first;
+    value[0] = std::sqrt(1.0 / samples);
+    for (uint32_t k = 1; k < terms; ++k) {
+        value[k] = t1;
+        const double t2 = 2 * first * t1 - t0;
+        t0 = t1, t1 = t2;
     }
+}
+
+/// Samples that a spline goes by at a moment: what each has of its value and of its slope.
+struct Knots {
+    uint32_t first;  ///< sample of the first of four; what is beyond the ends has no share
+    double value[4] = {}, slope[4] = {};
+};
+Knots knots_at(uint32_t samples, double s) {
+    if (samples == 1) return {0, {1}, {}};
+    const uint32_t last = samples - 1, low = s < last ? uint32_t(s) : last - 1;
+    const double f = s - low, rest = 1 - f;
+    const double value[4] = {(1 + 2 * f) * rest * rest, f * rest * rest, f * f * (3 - 2 * f), -f * f * rest};  // Hermite's: start, its slope, end, its slope
+    const double slope[4] = {-6 * f * rest, rest * (1 - 3 * f), 6 * f * rest, f * (3 * f - 2)};
+    const bool starts = low == 0, ends = low + 1 == last;
+    Knots knots{starts ? 0 : low - 1};
+    const auto share = [&](uint32_t sample, double of_value, double of_slope) {
+        knots.value[sample - knots.first] += of_value, knots.slope[sample - knots.first] += of_slope;
+    };
+    share(low, value[0], slope[0]), share(low + 1, value[2], slope[2]);
+    // The slope at a sample is that from the one before to the one after it; at an end, of the two there are.
+    const uint32_t from[2] = {starts ? low : low - 1, low}, to[2] = {low + 1, ends ? low + 1 : low + 2};
+    for (int end = 0; end < 2; ++end) {
+        const double steps = to[end] - from[end], v = value[1 + 2 * end] / steps, d = slope[1 + 2 * end] / steps;
+        share(to[end], v, d), share(from[end], -v, -d);
+    }
+    return knots;
 }
 
 /// Applies the first `terms` rows of the orthonormalisation to the plain functions, in place. Each function
@@ -74,8 +101,8 @@ void orthonormal_row(const double* rows, uint32_t terms, double* g) {
 /// Rows of the length: row j holds the j projections, then 1 / norm.
 void orthonormalise(uint32_t samples, double* rows) {
     const uint32_t terms = extension_terms(samples);
-    double g[max_window_samples][max_terms], unused[max_terms];
-    for (uint32_t s = 0; s < samples; ++s) plain_row(samples, s, terms, g[s], unused);
+    double g[max_window_samples][max_terms];
+    for (uint32_t s = 0; s < samples; ++s) plain_row(samples, s, terms, g[s]);
     for (uint32_t j = 0; j < terms; ++j) {
         double* row = rows + triangle(j);
         for (uint32_t i = 0; i < j; ++i) row[i] = 0;
@@ -110,22 +137,33 @@ void build_basis_tables(BasisTables& tables, void* memory, uint32_t longest) noe
     for (uint32_t n = 1; n <= tables.longest; ++n) orthonormalise(n, matrix + table_offsets[n]);
 }
 
-void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, uint32_t terms,
-               float* value, float* derivative) noexcept {
-    const double end = samples - 1.0, inside = s < 0 ? 0 : s > end ? end : s, beyond = s - inside;
-    double v[max_terms], d[max_terms];
+void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, uint32_t sample, uint32_t terms, float* value) noexcept {
+    double v[max_terms];
     if (cosine) {
-        cosine_row(samples, inside, terms, v, d);
+        cosine_row(samples, sample, terms, v);
     } else {
-        plain_row(samples, inside, terms, v, d);
+        plain_row(samples, sample, terms, v);
+        orthonormal_row(tables.matrix + table_offsets[samples], terms, v);
+    }
+    for (uint32_t k = 0; k < terms; ++k) value[k] = float(v[k]);
+}
+
+void spline_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, uint32_t terms, float* value,
+                float* derivative) noexcept {
+    const double end = samples - 1.0, inside = s < 0 ? 0 : s > end ? end : s, beyond = s - inside;
+    const Knots knots = knots_at(samples, inside);
+    double v[max_terms] = {}, d[max_terms] = {}, at[max_terms];
+    for (uint32_t i = 0; i < 4; ++i) {
+        if (knots.value[i] == 0 && knots.slope[i] == 0) continue;
+        (cosine ? cosine_row : plain_row)(samples, knots.first + i, terms, at);
+        for (uint32_t k = 0; k < terms; ++k) v[k] += knots.value[i] * at[k], d[k] += knots.slope[i] * at[k];
+    }
+    if (!cosine) {
         const double* rows = tables.matrix + table_offsets[samples];
         orthonormal_row(rows, terms, v);
-        orthonormal_row(rows, terms, d);  // linear: derivatives combine as the functions do
+        orthonormal_row(rows, terms, d);  // linear: sums of rows become the sums of what they become
     }
-    for (uint32_t k = 0; k < terms; ++k) {
-        value[k] = float(v[k] + beyond * d[k]);
-        if (derivative) derivative[k] = float(d[k]);
-    }
+    for (uint32_t k = 0; k < terms; ++k) value[k] = float(v[k] + beyond * d[k]), derivative[k] = float(d[k]);
 }
 
 }  // namespace rill::format

@@ -25,10 +25,15 @@ size_t basis_tables_bytes(uint32_t longest) noexcept;
 /// `memory` must outlive the tables; 16-byte aligned.
 void build_basis_tables(BasisTables& tables, void* memory, uint32_t longest) noexcept;
 
-/// Values φ_0 … φ_{terms−1} of the basis of length `samples` at time s (in samples, 0 … samples − 1;
-/// real), and derivatives dφ/ds (may be null). terms ≤ most_terms(). For s outside [0, samples − 1]
-/// the tangent line at the end is continued.
-void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, uint32_t terms,
-               float* value, float* derivative) noexcept;
+/// Values φ_0 … φ_{terms−1} of the basis of length `samples` at one of its samples. terms ≤ most_terms().
+void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, uint32_t sample, uint32_t terms, float* value) noexcept;
+
+/// What a track does at any real time s, in samples: rows of the spline through what it is at its samples (Catmull & Rom 1974), and
+/// derivatives by s. At a sample the values are basis_row(), to the bit. For s outside [0, samples − 1] the tangent line at the end is
+/// continued.
+///
+/// Not the functions themselves: most series of violent liquid hold as many terms as samples, and such functions swing between
+/// them as far as any noise lets them. Figures, and what else was tried: cooker/README.md, "Between frames".
+void spline_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, uint32_t terms, float* value, float* derivative) noexcept;
 
 }  // namespace rill::format

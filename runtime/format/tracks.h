@@ -12,11 +12,11 @@
 // Time inside a window is measured in samples: s = 0 is its first frame, s = sample_count − 1 its
 // last. A track lives on the closed range [birth, death] of samples. Its channels are
 //     c(s) = Σ_k coefficient[k] · φ_k(s − birth),  k < terms,
-// φ_k the orthonormal Fourier-extension basis of length death − birth + 1 (fourier_extension.h).
-// A track that is born (not carried over the window's border) is also active on (birth − 1, birth),
-// one that dies on (death, death + 1): there it moves along the tangent of its end and its
-// activity ramps linearly between 0 and 1; over half of it if its life is one sample, which has no tangent. Elsewhere
-// activity is 1; outside, the track is absent.
+// at its samples, φ_k the orthonormal Fourier-extension basis of length death − birth + 1, and go on a spline through
+// these between them (fourier_extension.h). A track that is born (not carried over the window's border) is also active
+// before its birth, one that dies after its death: there it moves along the tangent of its end and its activity falls
+// linearly from 1 to 0, a point's within half a sample, a drop's within one, or half a one if its life is one sample,
+// which has no tangent. Elsewhere activity is 1; outside, the track is absent.
 #pragma once
 #include <cstdint>
 

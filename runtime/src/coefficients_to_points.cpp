@@ -47,17 +47,21 @@ void make_row(const TimeRows* rows, const format::Track& track) {
     made_of(rows)[row] = 1;
     const bool cosine = (track.flags & format::track_cosine) != 0;
     float* out = floats_of(rows, row);
-    format::basis_row(rows->tables, life, cosine, rows->s - track.birth, format::most_terms(life, cosine), out, out + rows->stride);
+    format::spline_row(rows->tables, life, cosine, rows->s - track.birth, format::most_terms(life, cosine), out, out + rows->stride);
 }
 
-/// 0: absent.
-float activity_at(const format::Track& track, double s) {
+/// 0: absent. Points fade within half a step, so that in the middle between two frames the surface is that of those that live through both:
+/// others, going on along their tangents or coming along them, stand beside it, and are seen as scraps and lumps (cooker/README.md, "Between
+/// frames"). Drops are all there is of most pieces and shrink until the next frame; but of one sample, which tells no motion, they would
+/// stand where fast liquid only will be, or was.
+float activity_at(const format::TrackBlock& block, uint32_t index, double s) {
+    const format::Track& track = block.tracks[index];
     const bool before = s < track.birth, after = s > track.death;
     if (!before && !after) return 1;
     if (!(track.flags & (before ? format::track_born : format::track_dies))) return 0;
     const double away = before ? track.birth - s : s - track.death;
-    // One sample tells no motion: such a track stands where fast liquid only will be, or was, and is seen there as scraps.
-    return float(1 - away * (track.birth == track.death ? 2 : 1));
+    const bool whole_step = index >= block.point_count && track.birth < track.death;
+    return float(1 - away * (whole_step ? 1 : 2));
 }
 
 /// Σ row[k] · coefficient[k][c]: the channels of a track at one moment.
@@ -86,7 +90,7 @@ TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint3
 uint32_t count_active(TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last) noexcept {
     uint32_t active = 0;
     for (uint32_t i = first; i < last; ++i) {
-        if (!(activity_at(block.tracks[i], rows->s) > 0)) continue;
+        if (!(activity_at(block, i, rows->s) > 0)) continue;
         make_row(rows, block.tracks[i]);
         ++active;
     }
@@ -99,7 +103,7 @@ uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, 
     uint32_t active = 0;
     for (uint32_t i = first; i < last; ++i) {
         const format::Track& track = block.tracks[i];
-        const float activity = activity_at(track, rows->s);
+        const float activity = activity_at(block, i, rows->s);
         if (!(activity > 0)) continue;
         const float* row = floats_of(rows, row_of(*rows, track));
         const float* coefficients = block.coefficients + track.first_coefficient;
