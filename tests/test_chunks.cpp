@@ -500,7 +500,7 @@ TEST_CASE("evaluation: drops shrink over a whole step, those of one sample over 
                                    &drops.shape[4], &drops.shape[5], &drops.vx,       &drops.vy,       &drops.vz,       &drops.activity};
         for (int i = 0; i < 13; ++i) *streams[i] = memory.data() + 2 * i;
         format::PointSet points{};
-        TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, 24);
+        TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, {}, 24);
         const uint32_t counted = count_active(rows, d.block, 0, 2);
         CHECK(evaluate_tracks(rows, d.block, 0, 2, 0, 2, points, drops) == counted);
         CHECK(counted <= 1);
@@ -535,7 +535,7 @@ TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact veloc
         for (int i = 0; i < 10; ++i) *streams[i] = memory.data() + 4 * i;
         points.count = 0;
         format::DropSet drops{};
-        TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, 24);
+        TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, {}, 24);
         const uint32_t counted = count_active(rows, d.block, 0, 4);
         const uint32_t active = evaluate_tracks(rows, d.block, 0, 4, capacity, 0, points, drops);
         CHECK(counted == active);

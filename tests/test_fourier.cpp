@@ -22,7 +22,7 @@ struct Row {
 };
 Row row(uint32_t samples, bool cosine, double s, uint32_t terms) {
     Row r{};
-    spline_row(tables(), samples, cosine, s, terms, r.value, r.derivative);
+    spline_row(tables(), samples, cosine, s, {}, terms, r.value, r.derivative);
     return r;
 }
 
@@ -216,6 +216,32 @@ TEST_CASE("the derivative is that of the value, and goes on through the samples;
                       doctest::Approx(first.value[k] - 0.5f * first.derivative[k]).epsilon(1e-4));
                 CHECK(past.derivative[k] == last.derivative[k]);
             }
+        }
+}
+
+TEST_CASE("what moves evenly does so whatever the times of frames, at its ends and beyond them too") {
+    const std::vector<double> times = {0, 0.5, 2, 2.1, 3, 4.5, 5, 5.25, 7};  // the life is samples 1 … 7
+    const uint32_t life = 7, terms = most_terms(life, true);
+    const auto place = [](double t) { return 3 - 0.8 * t; };
+    std::vector<double> c(terms);
+    for (uint32_t s = 0; s < life; ++s) {
+        const Row r = row(life, true, s, terms);
+        for (uint32_t k = 0; k < terms; ++k) c[k] += place(times[s + 1]) * r.value[k];
+    }
+    for (size_t i = 0; i + 1 < times.size(); ++i)
+        for (double f = 0; f < 1; f += 0.125) {
+            const double step = times[i + 1] - times[i];
+            StepRatios steps;
+            if (i > 0) steps.before = (times[i] - times[i - 1]) / step;
+            if (i + 2 < times.size()) steps.after = (times[i + 2] - times[i + 1]) / step;
+            Row r{};
+            spline_row(tables(), life, true, double(i) - 1 + f, steps, terms, r.value, r.derivative);
+            double x = 0, v = 0;
+            for (uint32_t k = 0; k < terms; ++k) x += c[k] * r.value[k], v += c[k] * r.derivative[k];
+            CAPTURE(i);
+            CAPTURE(f);
+            CHECK(x == doctest::Approx(place(times[i] + f * step)).epsilon(1e-5));
+            CHECK(v / step == doctest::Approx(-0.8).epsilon(1e-5));
         }
 }
 

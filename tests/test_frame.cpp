@@ -27,21 +27,17 @@ void check_ball(const Playing& playing, double seconds, bool uneven) {
     INFO(uneven);
     REQUIRE(playing.target.indices_used > 3000);
     float off = 0, turned = 1, slow = 0;
-    uint32_t slower = 0;
     for (uint32_t i = 0; i < playing.target.indices_used; ++i) {
         const uint32_t v = playing.indices[i];
         REQUIRE(v < playing.target.vertices_used);
         const glm::vec3 arm = playing.positions[v] - Clip::centre(seconds);
         off = std::max(off, std::abs(glm::length(arm) - Clip::radius));
         turned = std::min(turned, glm::dot(playing.normals[v], glm::normalize(arm)));
-        const float amiss = glm::length(playing.velocities[v] - Clip::velocity(seconds));
-        slow = std::max(slow, amiss), slower += amiss > 0.08f;
+        slow = std::max(slow, glm::length(playing.velocities[v] - Clip::velocity(seconds)));
     }
     CHECK(off < 0.01f);
     CHECK(turned > 0.98f);
-    // At most one point in six hundred is of cosines, which stand still at the ends of a life.
-    CHECK(slow < 0.2f);
-    CHECK(slower < 0.01f * float(playing.target.indices_used));
+    CHECK(slow < 0.12f);  // at the ends of a window, where half a step of the ball's turning is not known
 }
 
 rill::cooker::Mesh mesh_of(const Playing& playing) {
@@ -370,6 +366,27 @@ TEST_CASE("clips of one frame, and of nothing at all") {
     CHECK(nothing.draw(0.5) == Status::ok);
     CHECK(nothing.target.vertices_used == 0);
     CHECK(nothing.target.ranges_used == 0);
+}
+
+TEST_CASE("frames uneven in time: velocity is the ball's, at frames and between them") {
+    const std::string path = scratch_path("uneven.rill");
+    Clip clip;
+    clip.uneven = true;
+    write_ball(clip, path);
+    rill::cooker::AssetPlayer player(path, 2);
+    for (uint32_t frame = 1; frame + 2 < clip.frames; ++frame)
+        for (const double f : {0., 0.5}) {
+            // At its window's first and last frame a track knows the step on one side alone.
+            if (frame % clip.window == 0 || (frame + 1) % clip.window == 0) continue;
+            const double seconds = clip.seconds(frame) + f * (clip.seconds(frame + 1) - clip.seconds(frame));
+            const rill::cooker::Mesh mesh = player.mesh(seconds);
+            glm::vec3 sum{};
+            for (const glm::vec3& v : mesh.velocities) sum += v;
+            CAPTURE(frame);
+            CAPTURE(f);
+            CHECK(glm::distance(sum / float(mesh.velocities.size()), Clip::velocity(seconds)) < 0.02f);
+        }
+    std::filesystem::remove(path);
 }
 
 TEST_CASE("the cooker's player grows its buffers until everything fits") {

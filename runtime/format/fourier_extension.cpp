@@ -62,29 +62,37 @@ void cosine_row(uint32_t samples, uint32_t sample, uint32_t terms, double* value
     }
 }
 
-/// Samples that a spline goes by at a moment: what each has of its value and of its slope.
+/// Four samples that a spline goes by at a moment: what each has of its value and of its slope.
 struct Knots {
-    uint32_t first;  ///< sample of the first of four; what is beyond the ends has no share
+    uint32_t first;  ///< of the four; those beyond the ends have no share
     double value[4] = {}, slope[4] = {};
 };
-Knots knots_at(uint32_t samples, double s) {
+Knots knots_at(uint32_t samples, double s, const StepRatios& steps) {
     if (samples == 1) return {0, {1}, {}};
-    const uint32_t last = samples - 1, low = s < last ? uint32_t(s) : last - 1;
-    const double f = s - low, rest = 1 - f;
-    const double value[4] = {(1 + 2 * f) * rest * rest, f * rest * rest, f * f * (3 - 2 * f), -f * f * rest};  // Hermite's: start, its slope, end, its slope
-    const double slope[4] = {-6 * f * rest, rest * (1 - 3 * f), 6 * f * rest, f * (3 * f - 2)};
+    const uint32_t last = samples - 1;
+    if (s < 0) return {0, {1 - s / steps.after, s / steps.after}, {-1 / steps.after, 1 / steps.after}};
+    if (s >= last) {
+        const double beyond = (s - last) / steps.before;
+        return {last - 1, {-beyond, 1 + beyond}, {-1 / steps.before, 1 / steps.before}};
+    }
+    const uint32_t low = uint32_t(s);
     const bool starts = low == 0, ends = low + 1 == last;
     Knots knots{starts ? 0 : low - 1};
     const auto share = [&](uint32_t sample, double of_value, double of_slope) {
         knots.value[sample - knots.first] += of_value, knots.slope[sample - knots.first] += of_slope;
     };
-    share(low, value[0], slope[0]), share(low + 1, value[2], slope[2]);
-    // The slope at a sample is that from the one before to the one after it; at an end, of the two there are.
-    const uint32_t from[2] = {starts ? low : low - 1, low}, to[2] = {low + 1, ends ? low + 1 : low + 2};
-    for (int end = 0; end < 2; ++end) {
-        const double steps = to[end] - from[end], v = value[1 + 2 * end] / steps, d = slope[1 + 2 * end] / steps;
-        share(to[end], v, d), share(from[end], -v, -d);
-    }
+    const auto difference = [&](uint32_t to, double per_step, double of_value, double of_slope) {  // of two samples, in units of this step
+        share(to, of_value * per_step, of_slope * per_step), share(to - 1, -of_value * per_step, -of_slope * per_step);
+    };
+    // Hermite's cubic, of the samples at both ends and the slopes there, and its derivative.
+    const double f = s - low, rest = 1 - f;
+    share(low, (1 + 2 * f) * rest * rest, -6 * f * rest), share(low + 1, f * f * (3 - 2 * f), 6 * f * rest);
+    const double value[2] = {f * rest * rest, -f * f * rest}, slope[2] = {rest * (1 - 3 * f), f * (3 * f - 2)};
+    // A slope is the mean of those of the steps on both sides, the shorter step's counting more; at an end that of the only one.
+    const double before = starts ? 0 : 1 / (1 + steps.before), after = ends ? 0 : 1 / (1 + steps.after);
+    difference(low + 1, 1 - before, value[0], slope[0]), difference(low + 1, 1 - after, value[1], slope[1]);
+    if (!starts) difference(low, before / steps.before, value[0], slope[0]);
+    if (!ends) difference(low + 2, after / steps.after, value[1], slope[1]);
     return knots;
 }
 
@@ -148,10 +156,9 @@ void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, uint32_
     for (uint32_t k = 0; k < terms; ++k) value[k] = float(v[k]);
 }
 
-void spline_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, uint32_t terms, float* value,
+void spline_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, const StepRatios& steps, uint32_t terms, float* value,
                 float* derivative) noexcept {
-    const double end = samples - 1.0, inside = s < 0 ? 0 : s > end ? end : s, beyond = s - inside;
-    const Knots knots = knots_at(samples, inside);
+    const Knots knots = knots_at(samples, s, steps);
     double v[max_terms] = {}, d[max_terms] = {}, at[max_terms];
     for (uint32_t i = 0; i < 4; ++i) {
         if (knots.value[i] == 0 && knots.slope[i] == 0) continue;
@@ -163,7 +170,7 @@ void spline_row(const BasisTables& tables, uint32_t samples, bool cosine, double
         orthonormal_row(rows, terms, v);
         orthonormal_row(rows, terms, d);  // linear: sums of rows become the sums of what they become
     }
-    for (uint32_t k = 0; k < terms; ++k) value[k] = float(v[k] + beyond * d[k]), derivative[k] = float(d[k]);
+    for (uint32_t k = 0; k < terms; ++k) value[k] = float(v[k]), derivative[k] = float(d[k]);
 }
 
 }  // namespace rill::format

@@ -56,7 +56,7 @@ uint32_t prepare_evaluate(void* context) {
     Evaluation& e = player.evaluation;
     const Moment& moment = player.plan.moment;
     const uint32_t samples = player.directory->tables.windows[moment.window].sample_count;
-    e.rows = place_time_rows(e.rows_memory, player.directory->basis, samples, moment.sample, moment.samples_per_second);
+    e.rows = place_time_rows(e.rows_memory, player.directory->basis, samples, moment.sample, moment.steps, moment.samples_per_second);
     list_pieces(player, e);
     lay_out_pieces(player, e);
     return e.piece_count;

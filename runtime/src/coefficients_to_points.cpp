@@ -15,6 +15,7 @@ struct TimeRows {
     format::BasisTables tables;
     uint32_t samples, stride;  ///< stride: floats in a row
     double s;
+    format::StepRatios steps;
     float samples_per_second;
 };
 
@@ -47,7 +48,7 @@ void make_row(const TimeRows* rows, const format::Track& track) {
     made_of(rows)[row] = 1;
     const bool cosine = (track.flags & format::track_cosine) != 0;
     float* out = floats_of(rows, row);
-    format::spline_row(rows->tables, life, cosine, rows->s - track.birth, format::most_terms(life, cosine), out, out + rows->stride);
+    format::spline_row(rows->tables, life, cosine, rows->s - track.birth, rows->steps, format::most_terms(life, cosine), out, out + rows->stride);
 }
 
 /// 0: absent. Points fade within half a step, so that in the middle between two frames the surface is that of those that live through both:
@@ -81,8 +82,8 @@ size_t time_rows_bytes(uint32_t sample_count) noexcept {
 }
 
 TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count, double s,
-                          double samples_per_second) noexcept {
-    auto* rows = new (memory) TimeRows{tables, sample_count, row_stride(sample_count), s, float(samples_per_second)};
+                          const format::StepRatios& steps, double samples_per_second) noexcept {
+    auto* rows = new (memory) TimeRows{tables, sample_count, row_stride(sample_count), s, steps, float(samples_per_second)};
     std::memset(made_of(rows), 0, rows_in(sample_count));
     return rows;
 }

@@ -15,7 +15,7 @@ size_t time_rows_bytes(uint32_t sample_count) noexcept;
 /// s: samples since the window's first, 0 … sample_count − 1. samples_per_second: ds/dt at s, which
 /// turns derivatives into metres per second. The tables must outlive the rows.
 TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count,
-                          double s, double samples_per_second) noexcept;
+                          double s, const format::StepRatios& steps, double samples_per_second) noexcept;
 /// How many of the tracks [first, last) of the block are active at the rows' time; makes their rows.
 uint32_t count_active(TimeRows* rows, const format::TrackBlock& block, uint32_t first, uint32_t last) noexcept;
 /// Appends those of them that are active, and sound, to points/drops. They must have been counted.

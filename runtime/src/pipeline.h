@@ -115,6 +115,7 @@ struct Moment {
     double seconds;                ///< clamped to the clip
     double sample;                 ///< within the window
     double samples_per_second;
+    format::StepRatios steps;
 };
 struct Want {
     uint32_t chunk;

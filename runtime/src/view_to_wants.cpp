@@ -209,9 +209,12 @@ Moment moment_at(const Directory& directory, double seconds) noexcept {
         else end = middle;
     }
     const format::WindowRecord& window = directory.tables.windows[w];
-    const uint32_t before = low < last ? low : last ? last - 1 : 0;
-    const double step = last ? frame_time(directory, before + 1) - frame_time(directory, before)
-                             : 1 / directory.header.frames_per_second;
+    // The step that begins there, or the clip's last; a single frame has none.
+    const uint32_t begin = low < last ? low : last ? last - 1 : 0;
+    const auto length = [&](uint32_t frame) { return frame_time(directory, frame + 1) - frame_time(directory, frame); };
+    const double step = last ? length(begin) : 1 / directory.header.frames_per_second;
+    if (begin == low && begin > 0) moment.steps.before = length(begin - 1) / step;
+    if (begin + 2 <= last) moment.steps.after = length(begin + 1) / step;
     moment.window = w;
     moment.sample = low - window.first_sample + (moment.seconds - frame_time(directory, low)) / step;
     moment.sample = std::min(moment.sample, double(window.sample_count - 1));
