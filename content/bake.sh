@@ -6,7 +6,7 @@
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 if [ $# -lt 2 ] || [ ! -f "$here/bake/$1.py" ]; then
-    echo "usage: content/bake.sh SCENE OUT [res=N] [frames=N]; SCENE is one of:" >&2
+    echo "usage: content/bake.sh SCENE OUT [res=N] [frames=N] [fps=N]; SCENE is one of:" >&2
     for scene in "$here"/bake/*.py; do
         case $(basename "$scene" .py) in scene | cache_to_ply) ;; *) basename "$scene" .py >&2 ;; esac
     done

@@ -117,6 +117,29 @@ TEST_CASE("fading: the surface moves smoothly while a point comes and goes") {
     CHECK(largest_step < 0.03 * h);
 }
 
+TEST_CASE("fading: points that are all but gone leave the surface as it is without them") {
+    const double h = 0.15;
+    Cloud cloud;
+    add(cloud, sphere_of(1), h);
+    Random random(5);
+    const size_t whole = cloud.activity.size();
+    for (size_t i = 0; i < whole / 2; ++i) {  // among the others, and not where these put the surface
+        const Vec d = random.direction();
+        cloud.add((1 + 0.04 * (random() - 0.5)) * d, d);
+    }
+    std::vector<Vec> positions;
+    for (int i = 0; i < 500; ++i) positions.push_back(random.direction());
+    std::vector<Value> values[2];
+    for (const int gone : {0, 1}) {
+        std::fill(cloud.activity.begin() + long(whole), cloud.activity.end(), gone ? 0.f : 1e-3f);
+        values[gone] = evaluate(RealField(cloud).field, positions);
+    }
+    double worst = 0;
+    for (size_t i = 0; i < positions.size(); ++i) worst = std::max(worst, std::fabs(double(values[0][i].value) - values[1][i].value));
+    INFO("worst ", worst / h, " spacings");
+    CHECK(worst < 3e-4 * h);  // .0012 where they keep their places among neighbours
+}
+
 TEST_CASE("fading: what a point alone covers goes little by little") {
     Cloud cloud;
     add(cloud, sphere_of(1), 0.15);

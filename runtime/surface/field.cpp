@@ -14,7 +14,7 @@ namespace {
 size_t aligned(size_t bytes) { return (bytes + 63) & ~size_t(63); }
 
 uint32_t bundles_of(uint32_t count) { return (count + lanes - 1) / lanes; }
-constexpr uint32_t point_rows = 13, drop_rows = 15, drop_bundle_rows = 6, bundle_rows = 13;
+constexpr uint32_t point_rows = 14, drop_rows = 15, drop_bundle_rows = 6, bundle_rows = 13;
 size_t bundle_bytes(uint32_t bundles) { return bundle_rows * aligned((bundles + lanes) * sizeof(float)); }
 
 struct Carver {
@@ -35,7 +35,7 @@ void carve_bundles(Bundles& b, Carver& carver, uint32_t capacity) {
 void carve(Field& field, Carver carver, uint32_t points, uint32_t drops) {
     field.patches = carver.take<Patch>(points);
     float** arrays[point_rows] = {&field.x,  &field.y,  &field.z,  &field.nx,      &field.ny,       &field.nz,
-                                  &field.vx, &field.vy, &field.vz, &field.support, &field.activity, &field.area, &field.steep};
+                                  &field.vx, &field.vy, &field.vz, &field.support, &field.activity, &field.farther, &field.area, &field.steep};
     for (float** array : arrays) *array = carver.take<float>(points + lanes);  // kernels read whole batches
     field.source = carver.take<uint32_t>(points);
     float** drop_arrays[] = {&field.dx, &field.dy, &field.dz, &field.dvx, &field.dvy, &field.dvz,
@@ -125,11 +125,12 @@ void place_point(Field& f, uint32_t at, const format::PointSet& p) {
     f.nx[at] = p.nx[i] * scale, f.ny[at] = p.ny[i] * scale, f.nz[at] = p.nz[i] * scale;
     f.vx[at] = p.vx[i], f.vy[at] = p.vy[i], f.vz[at] = p.vz[i];
     f.activity[at] = std::min(p.activity[i], 1.f);
+    f.farther[at] = 1 / std::sqrt(std::max(f.activity[at], 1e-12f));
 }
 void pad_points(Field& f) {
     for (uint32_t at = f.point_count; at < f.point_count + lanes; ++at) {
         f.x[at] = f.y[at] = f.z[at] = nowhere;
-        f.nx[at] = f.ny[at] = f.nz[at] = f.activity[at] = f.area[at] = 0, f.steep[at] = 1;
+        f.nx[at] = f.ny[at] = f.nz[at] = f.activity[at] = f.area[at] = 0, f.farther[at] = f.steep[at] = 1;
     }
 }
 

@@ -52,6 +52,7 @@ struct Field {
     float *nx, *ny, *nz;                   ///< normal of the patch (unit)
     float *support, *steep;                ///< radius R_i beyond which the patch has no weight, and 1 / R_i²
     float* activity;
+    float* farther;                        ///< 1 / √activity: so many times its squared distance counts, as a neighbour
     float* area;                           ///< that the point stands for, over 4π, for the winding number
     float *vx, *vy, *vz;
     uint32_t* source;                      ///< index in the PointSet each came from
