@@ -12,8 +12,8 @@ namespace rill {
 /// Basis rows at one moment of one window, shared by all its tracks: computed once per frame, and only those that tracks need.
 struct TimeRows;
 size_t time_rows_bytes(uint32_t sample_count) noexcept;
-/// s: samples since the window's first, 0 … sample_count − 1. samples_per_second: ds/dt at s, which
-/// turns derivatives into metres per second. The tables must outlive the rows.
+/// s: samples since the window's first, 0 … sample_count − 1. `steps`: of the frames around it. samples_per_second:
+/// ds/dt at s, which turns derivatives into metres per second. The tables must outlive the rows.
 TimeRows* place_time_rows(void* memory, const format::BasisTables& tables, uint32_t sample_count,
                           double s, const format::StepRatios& steps, double samples_per_second) noexcept;
 /// How many of the tracks [first, last) of the block are active at the rows' time; makes their rows.
