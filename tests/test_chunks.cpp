@@ -485,25 +485,36 @@ TEST_CASE("slip left to the neighbours is its own where there are none, and neve
     CHECK(all_numbers(decode(lone.bytes.data(), lone.bytes.size(), lone.shape).block) == expected_numbers(tracks));
 }
 
-TEST_CASE("evaluation: drops shrink over a whole step, those of one sample over half of one") {
+TEST_CASE("evaluation: drops shrink over a whole step, drifting if they have one sample; over half of one where that has no drift") {
     std::mt19937 random(3);
+    const glm::vec3 drift(0.2f, -0.05f, -0.3f);
     std::vector<QuantisedTrack> tracks;
-    for (const auto& [birth, death] : {std::pair{4u, 9u}, {15u, 15u}}) tracks.push_back(quantise_track(make_track(random, birth, death, true), quantiser, origin, tables()));
+    for (const auto& [birth, death] : {std::pair{4u, 9u}, {15u, 15u}, {20u, 20u}}) {
+        TrackSamples track = make_track(random, birth, death, true);
+        if (birth == 20) track.drift = drift;
+        tracks.push_back(quantise_track(track, quantiser, origin, tables()));
+    }
+    const TrackSamples drifting = dequantise_track(tracks.back(), quantiser, origin, tables());
+    // A step of drift is a tangential step of motion.
+    CHECK(glm::length(drifting.drift - drift) < 0.5f * std::sqrt(3.f) * quantiser.step * quantiser.tangent_ratio * float(format::position_gain * scale_of(1)));
+    CHECK(drifting.drift != glm::vec3(0));
     const EncodedChunk chunk = encode(tracks);
     const Decoded d = decode(chunk.bytes.data(), chunk.bytes.size(), chunk.shape);
     REQUIRE(d.status == Status::ok);
-    std::vector<float> memory(13 * 2);
+    std::vector<float> memory(13 * 3);
     std::vector<uint64_t> rows_memory(time_rows_bytes(window) / 8 + 1);
+    glm::vec3 place, velocity;
     const auto activity = [&](double s) {  // of the only one there
         format::DropSet drops{};
         float** const streams[] = {&drops.x,        &drops.y,        &drops.z,        &drops.shape[0], &drops.shape[1], &drops.shape[2], &drops.shape[3],
                                    &drops.shape[4], &drops.shape[5], &drops.vx,       &drops.vy,       &drops.vz,       &drops.activity};
-        for (int i = 0; i < 13; ++i) *streams[i] = memory.data() + 2 * i;
+        for (int i = 0; i < 13; ++i) *streams[i] = memory.data() + 3 * i;
         format::PointSet points{};
         TimeRows* rows = place_time_rows(rows_memory.data(), tables(), window, s, {}, 24);
-        const uint32_t counted = count_active(rows, d.block, 0, 2);
-        CHECK(evaluate_tracks(rows, d.block, 0, 2, 0, 2, points, drops) == counted);
+        const uint32_t counted = count_active(rows, d.block, 0, 3);
+        CHECK(evaluate_tracks(rows, d.block, 0, 3, 0, 3, points, drops) == counted);
         CHECK(counted <= 1);
+        place = {drops.x[0], drops.y[0], drops.z[0]}, velocity = {drops.vx[0], drops.vy[0], drops.vz[0]};
         return counted ? drops.activity[0] : 0.f;
     };
     CHECK(activity(6.3) == 1);
@@ -513,6 +524,11 @@ TEST_CASE("evaluation: drops shrink over a whole step, those of one sample over 
     CHECK(activity(15) == 1);
     CHECK(activity(14.75) == doctest::Approx(0.5));
     CHECK(activity(15.5) == 0);
+    for (const float away : {-0.75f, -0.25f, 0.f, 0.5f}) {
+        CHECK(activity(20 + away) == doctest::Approx(1 - std::abs(away)));
+        CHECK(glm::distance(place, drifting.position[0] + away * drifting.drift) < 1e-5f);
+        CHECK(glm::distance(velocity, 24.f * drifting.drift) < 1e-4f);
+    }
 }
 
 TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact velocity") {

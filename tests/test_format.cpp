@@ -99,14 +99,15 @@ TEST_CASE("what was written is what is read") {
     CHECK(make_ball(clip) == bytes);  // the same input gives the same bytes
 }
 
-TEST_CASE("shapes of drops: a step as that of motion, from version 6 on a quarter of it") {
+TEST_CASE("shapes of drops: a step as that of motion, from version 6 on a quarter of it; drops of one sample drift from version 7 on") {
     using namespace rill::format;
     Header header{};
-    for (const uint32_t version : {version_4, version_5, version_6}) {
+    for (const uint32_t version : {version_4, version_5, version_6, version_7}) {
         CAPTURE(version);
         header.version = version;
         const LatticeSteps steps = steps_of(header, WindowRecord{});
         CHECK(steps.shape_unit == (version < version_6 ? 256 : 64));
+        CHECK(steps.lone_drops_drift == (version >= version_7));
         RawTrack raw{};
         raw.position_terms = raw.second_terms = 1, raw.second[0][2] = -3;
         float memory[9];

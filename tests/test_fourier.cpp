@@ -245,8 +245,16 @@ TEST_CASE("what moves evenly does so whatever the times of frames, at its ends a
         }
 }
 
-TEST_CASE("a life of one sample is a constant") {
-    const Row at = row(1, false, 0.6, 1);
-    CHECK(at.value[0] == 1.f);
-    CHECK(at.derivative[0] == 0.f);
+TEST_CASE("a life of one sample is a constant; a second term drifts") {
+    for (const bool cosine : {false, true}) {
+        const Row at = row(1, cosine, -0.6, 2);
+        CHECK(at.value[0] == 1.f);
+        CHECK(at.derivative[0] == 0.f);
+        CHECK(at.value[1] == -0.6f);
+        CHECK(at.derivative[1] == 1.f);
+        float sampled[2];
+        basis_row(tables(), 1, cosine, 0, 2, sampled);
+        CHECK(sampled[0] == 1.f);
+        CHECK(sampled[1] == 0.f);
+    }
 }

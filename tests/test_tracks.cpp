@@ -223,7 +223,7 @@ TEST_CASE("coefficients chosen anew make up for each other, the same for any num
         spoilt.decoded[i] = dequantise_track(spoilt.tracks[i], spoilt.quantiser, goal.origin, tables());
     }
     CodedWindow refitted = spoilt, again = spoilt;
-    const std::vector<float> at_source(samples, 0.f);
+    const SurfaceAim at_source{std::vector<float>(samples, 0.f), {}};
     refit_tracks(window, refitted, goal, tables(), at_source);
     CHECK(error(spoilt) > 1.5 * error(coded));
     CHECK(error(refitted) < 1.25 * error(coded));
@@ -252,9 +252,42 @@ TEST_CASE("coefficients chosen anew aim as far outside the source as they are to
     };
     for (const float by : {0.3f, -0.3f}) {
         CodedWindow moved = coded;
-        refit_tracks(window, moved, goal, tables(), std::vector<float>(samples, by * goal.tolerance));
+        refit_tracks(window, moved, goal, tables(), {std::vector<float>(samples, by * goal.tolerance), {}});
         CHECK((outside(moved) - outside(coded)) / goal.tolerance == doctest::Approx(by).epsilon(0.08));
     }
+}
+
+TEST_CASE("a window begins nearly where the one before ended") {
+    Window window = standing_ball();
+    window.frames.resize(2), window.seconds.resize(2), window.motion.resize(1);
+    const WindowGoal goal = goal_of(window);
+    const SurfaceFrame& frame = *window.frames[0];
+    grow_tracks(window, {}, goal);
+    std::vector<SurfacePoint> before;
+    for (const Path& path : window.paths) {
+        if (!path.alive(0)) continue;
+        before.push_back(path.target(0));
+        before.back().position += (before.size() % 2 ? 0.6f : -0.6f) * goal.tolerance * before.back().normal;
+    }
+    const std::vector<float> left = measure_residual(frame, before).distance;
+    const auto apart = [&](Window of) {  // rms, of what the window before and this one decode to
+        const std::vector<float> distance = measure_residual(frame, decoded_points(code_tracks(of, goal, tables()).decoded, 0)).distance;
+        double sum = 0, area = 0;
+        for (size_t v = 0; v < distance.size(); ++v) {
+            const double off = distance[v] - left[v];
+            if (std::fabs(off) < 3 * goal.tolerance) sum += double(frame.area[v]) * off * off, area += frame.area[v];
+        }
+        return std::sqrt(sum / area);
+    };
+    const double alone = apart(window);
+    window.before = before;
+    CHECK(apart(window) < 0.75 * alone);
+    // Only there.
+    const SurfaceAim aim{{0.1f, 0.2f}, seam_of(window, goal)};
+    std::vector<float> first(left.size(), 0.f), second = first;
+    aim_at(aim, 0, frame, goal.container, first), aim_at(aim, 1, frame, goal.container, second);
+    CHECK(first != std::vector<float>(left.size(), 0.1f));
+    CHECK(second == std::vector<float>(left.size(), 0.2f));
 }
 
 TEST_CASE("the volume of thin liquid is the source's") {

@@ -21,6 +21,7 @@ struct TrackSamples {
     std::vector<glm::vec3> position;           ///< asset space, metres
     std::vector<glm::vec3> normal;             ///< points: unit
     std::vector<std::array<float, 6>> shape;   ///< drops: xx yy zz xy xz yz, metres
+    glm::vec3 drift{};                         ///< drops of one sample: how far they go from that to the next, metres
     glm::vec3 slip{};                          ///< points: mean velocity of the liquid past the track, m/s; along the surface counts
 };
 struct Quantiser {

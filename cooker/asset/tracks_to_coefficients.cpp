@@ -129,6 +129,7 @@ struct Fitter {
     double tangent_step() const { return double(steps.step) * steps.ratio / 16; }
     double motion_step() const { return cooker::motion_step(steps, life()); }
     double shape_step() const { return cooker::shape_step(steps, life()); }
+    double drift_step() const { return motion_step() * steps.ratio / 16; }
     double turn_step() const { return cooker::turn_step(steps, life()); }
     dvec3 position(uint32_t s) const { return dvec3(samples.position[s]) - origin; }
 
@@ -300,6 +301,8 @@ Attempt Fitter::attempt_drop(const Basis& basis) const {
         shape[0][size_t(c)] = checked(mean * std::sqrt(double(n)) / shape_step());
         out.add(quantise_series(basis, signal, shape_tolerance * quantiser.time_tolerance, shape_step(), c, shape, of_shapes));
     }
+    if (n == 1)
+        for (int c = 0; c < 3; ++c) motion[1][size_t(c)] = checked(samples.drift[c] / drift_step());
     keep_volume(basis, shape);
     track.flags = uint8_t(samples.flags | (basis.cosine ? format::track_cosine : 0));
     track.drop = true;
@@ -325,7 +328,8 @@ format::RawTrack raw_track(const QuantisedTrack& track) {
     const uint32_t most = track.birth > track.death ? 0
                                                     : format::most_terms(track.death - track.birth + 1u,
                                                                          track.flags & format::track_cosine);
-    if (track.position.size() < 3 || track.position.size() % 3 || track.position.size() / 3 > most ||
+    const bool drifts = track.drop && track.birth == track.death;
+    if (track.position.size() < 3 || track.position.size() % 3 || track.position.size() / 3 > most + drifts ||
         track.second.size() < channels || track.second.size() % channels ||
         track.second.size() / channels > most)
         throw InputError("chunk: a track has an impossible number of coefficients");
@@ -389,6 +393,7 @@ TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quan
     const uint32_t life = track.death - track.birth + 1u, channels = track.drop ? 6 : 3;
     const uint32_t terms = std::max(record.position_terms, record.second_terms);
     const float* second = coefficients.data() + 3 * record.position_terms;
+    if (track.drop && life == 1 && record.position_terms > 1) out.drift = {coefficients[3], coefficients[4], coefficients[5]};
     for (uint32_t s = 0; s < life; ++s) {
         float phi[max_terms], x[3] = {}, y[6] = {};
         format::basis_row(tables, life, record.flags & format::track_cosine, s, terms, phi);

@@ -182,10 +182,12 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
     result.numbers.assign(info.numbers.begin() + begin, info.numbers.begin() + end + 1);
     result.seconds.assign(info.seconds.begin() + begin, info.seconds.begin() + end + 1);
     std::vector<Path> survivors;
+    std::vector<SurfacePoint> before;
     Past past;
     for (uint32_t first = begin;;) {
         Window window = next_window(first, end, past, float(tolerance));
         window.opens_span = first == begin;
+        window.before = std::move(before);
         const uint32_t last = first + uint32_t(window.samples()) - 1;
         WindowGoal goal = goal_for(tolerance * (window.calm ? calm_tolerance : 1), survey_, settings_.jobs);
         goal.container = container();
@@ -195,6 +197,7 @@ SpanResult SpanCook::cook(uint32_t span, const std::string& output, double toler
         done(last - begin);
         if (last == end) break;
         survivors = survivors_of(window);
+        before = decoded_points(coded.decoded, window.samples() - 1);
         past = past_of(window);
         first = last;
     }

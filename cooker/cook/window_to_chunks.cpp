@@ -33,17 +33,18 @@ bool few_are_brief(const std::vector<QuantisedTrack>& tracks) {
 }
 
 /// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
-void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, float reach) {
+void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, float around) {
     chunk.lower = glm::vec3(1e30f), chunk.upper = glm::vec3(-1e30f);
     for (const TrackSamples* track : tracks)
         for (size_t k = 0; k < track->position.size(); ++k) {
             const glm::vec3& p = track->position[k];
-            float wide = reach;
+            float wide = around;
             if (track->drop) {
                 const auto& s = track->shape[k];
                 wide = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
             }
-            chunk.lower = glm::min(chunk.lower, p - wide), chunk.upper = glm::max(chunk.upper, p + wide);
+            const glm::vec3 reach = wide + glm::abs(track->drift);
+            chunk.lower = glm::min(chunk.lower, p - reach), chunk.upper = glm::max(chunk.upper, p + reach);
         }
 }
 

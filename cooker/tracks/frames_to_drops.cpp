@@ -244,6 +244,7 @@ std::vector<TrackSamples> track_drops(const Window& window, const std::vector<st
         const float farthest = reach * window.frames[size_t(s)]->edge;
         const std::vector<Drop>& drops = drops_of[size_t(s)];
         const float seconds = s ? float(window.seconds[size_t(s)] - window.seconds[size_t(s - 1)]) : 0;
+        const float to_next = s + 1 < window.samples() ? float(window.seconds[size_t(s + 1)] - window.seconds[size_t(s)]) : seconds;
         std::vector<Match> matches;
         for (uint32_t a = 0; a < alive.size(); ++a)
             for (uint32_t d = 0; d < drops.size(); ++d) {
@@ -272,6 +273,7 @@ std::vector<TrackSamples> track_drops(const Window& window, const std::vector<st
             TrackSamples& track = tracks[track_of[d]];
             track.death = uint8_t(s);
             track.position.push_back(drops[d].centre), track.shape.push_back(drops[d].shape);
+            track.drift = to_next * drops[d].velocity;
             alive.push_back(track_of[d]), at.push_back(&drops[d]);
         }
     }

@@ -27,11 +27,17 @@ struct CodedWindow {
 void grow_tracks(Window& window, const std::vector<Path>& survivors, const WindowGoal& goal);
 /// Quantises the tracks and corrects them against what they decode to.
 CodedWindow code_tracks(Window& window, const WindowGoal& goal, const format::BasisTables& tables);
-/// Adds to the distances of vertices (Residual) what makes `offset` metres outside the source the aim. Walls stay where they are.
-void aim_outside(const SurfaceFrame& frame, const surface::Container& container, float offset, std::vector<float>& distance);
+/// Where the decoded surface is to be: metres outside the source. Walls stay where they are.
+struct SurfaceAim {
+    std::vector<float> offset;            ///< by sample
+    std::vector<float> seam;              ///< of the vertices of sample 0, in addition: from seam_of(), or none
+};
+/// Most of the way to where the window before left the surface (Window::before): what is off alike on both sides of a border is not seen to jump.
+std::vector<float> seam_of(const Window& window, const WindowGoal& goal);
+/// Adds to the distances of a sample's vertices (Residual) what makes that the aim.
+void aim_at(const SurfaceAim& aim, int sample, const SurfaceFrame& frame, const surface::Container& container, std::vector<float>& distance);
 /// Chooses the coefficients of all tracks anew, so that together they decode to the least error for their bits.
-/// `offset`: metres outside the source that are aimed at, by sample.
-void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset);
+void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const SurfaceAim& aim);
 /// Steps of mean heights that bring the volume of pieces of few points nearer to the source's.
 void refit_volume(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables);
 /// Those that reach the last sample, as one-sample paths: what the next window continues.

@@ -60,6 +60,7 @@ struct Window {
     bool calm = false;                   ///< `motion` is the liquid's own
     bool slips = false;                  ///< the liquid goes another way than `motion`, along the surface: slip is kept
     std::vector<double> seconds;
+    std::vector<SurfacePoint> before;    ///< what the window before decodes to in the frame that both have, sample 0; none if it opens a span
     std::vector<Path> paths;
     int samples() const { return int(frames.size()); }
 };

@@ -182,7 +182,7 @@ std::optional<QuantisedTrack> TrackRefit::descend(double worth, double still) {
 /// The surfaces of a window, and what its tracks do to them.
 class WindowRefit {
 public:
-    WindowRefit(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset);
+    WindowRefit(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const SurfaceAim& aim);
     void refit_all();
 
 private:
@@ -209,14 +209,14 @@ private:
     std::vector<std::vector<uint32_t>> point_;  ///< by sample and track
 };
 
-WindowRefit::WindowRefit(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset)
+WindowRefit::WindowRefit(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const SurfaceAim& aim)
     : window_(window), coded_(coded), goal_(goal), tables_(tables), lever_(goal.quantiser.step / goal.quantiser.normal_step),
       surfaces_(window.frames.size()), point_(window.frames.size()) {
     parallel_for(surfaces_.size(), goal.jobs, [&](size_t s) {
         std::vector<uint32_t> ids;
         const std::vector<SurfacePoint> points = decoded_points(coded.decoded, int(s), &ids);
         surfaces_[s] = std::make_unique<SurfaceResponse>(*window.frames[s], points, credible * goal.tolerance);
-        aim_outside(*window.frames[s], goal.container, offset[s], surfaces_[s]->residual);
+        aim_at(aim, int(s), *window.frames[s], goal.container, surfaces_[s]->residual);
         point_[s].resize(coded.decoded.size());
         for (uint32_t i = 0; i < ids.size(); ++i) point_[s][ids[i]] = i;
     });
@@ -301,8 +301,8 @@ void WindowRefit::refit_all() {
 
 }  // namespace
 
-void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const std::vector<float>& offset) {
-    WindowRefit(window, coded, goal, tables, offset).refit_all();
+void refit_tracks(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables, const SurfaceAim& aim) {
+    WindowRefit(window, coded, goal, tables, aim).refit_all();
 }
 
 }  // namespace rill::cooker

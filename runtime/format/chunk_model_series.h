@@ -129,7 +129,8 @@ template <class Coder>
 bool ChunkModel<Coder>::series(RawTrack& t, const Frame& frame, bool second, const Near& moving, const RawTrack* source) {
     Terms terms{moving, second, drops_ && second ? 6u : 3u, {}, {}};
     const uint32_t start = drops_ && second ? 0 : 1, group = drops_ * 2u + second, life = t.death - t.birth + 1u;
-    const uint32_t limit = most_terms(life, (t.flags & track_cosine) != 0);
+    const bool drifts = drops_ && !second && life == 1 && steps_.lone_drops_drift;
+    const uint32_t limit = drifts ? 2 : most_terms(life, (t.flags & track_cosine) != 0);
     const uint32_t wanted_terms = source ? (second ? source->second_terms : source->position_terms) : 0;
     uint32_t count = start, likely = 0;  // likely: the neighbours' counts for a life as long as this
     for (uint32_t j = 0; j < moving.count; ++j) {

@@ -67,7 +67,6 @@ struct Knots {
     double value[4] = {}, slope[4] = {};
 };
 Knots knots_at(uint32_t samples, double s, const StepRatios& steps) {
-    if (samples == 1) return {0, {1}, {}};
     const uint32_t last = samples - 1;
     if (s < 0) return {0, {1 - s / steps.after, s / steps.after}, {-1 / steps.after, 1 / steps.after}};
     if (s >= last) {
@@ -146,7 +145,9 @@ void build_basis_tables(BasisTables& tables, void* memory, uint32_t longest) noe
 
 void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, uint32_t sample, uint32_t terms, float* value) noexcept {
     double v[max_terms];
-    if (cosine) {
+    if (samples == 1) {
+        v[0] = 1, v[1] = 0;
+    } else if (cosine) {
         cosine_row(samples, sample, terms, v);
     } else {
         plain_row(samples, sample, terms, v);
@@ -157,6 +158,11 @@ void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, uint32_
 
 void spline_row(const BasisTables& tables, uint32_t samples, bool cosine, double s, const StepRatios& steps, uint32_t terms, float* value,
                 float* derivative) noexcept {
+    if (samples == 1) {
+        value[0] = 1, derivative[0] = 0;
+        if (terms > 1) value[1] = float(s), derivative[1] = 1;
+        return;
+    }
     const Knots knots = knots_at(samples, s, steps);
     double v[max_terms] = {}, d[max_terms] = {}, at[max_terms];
     for (uint32_t i = 0; i < 4; ++i) {

@@ -25,7 +25,8 @@ size_t basis_tables_bytes(uint32_t longest) noexcept;
 /// `memory` must outlive the tables; 16-byte aligned.
 void build_basis_tables(BasisTables& tables, void* memory, uint32_t longest) noexcept;
 
-/// Values φ_0 … φ_{terms−1} of the basis of length `samples` at one of its samples. terms ≤ most_terms().
+/// Values φ_0 … φ_{terms−1} of the basis of length `samples` at one of its samples. terms ≤ most_terms(); of one sample up to 2: 1 and s, by
+/// which drops drift.
 void basis_row(const BasisTables& tables, uint32_t samples, bool cosine, uint32_t sample, uint32_t terms, float* value) noexcept;
 
 /// How long the steps from sample to sample before and after the one that begins at ⌊s⌋ take, in units of that one.

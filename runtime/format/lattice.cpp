@@ -93,12 +93,12 @@ void nearest_axis(const double direction[3], int32_t levels, int32_t axis[2]) no
 
 namespace {
 
-/// Integer components in a frame → asset axes, in 1/256 of a normal step.
-bool to_asset(const int32_t value[3], const Frame& frame, int64_t ratio, float* out) {
+/// Integer components in a frame, of `across` sixteenths of a step along the surface and `along` the normal → asset axes, in 1/256 of a step.
+bool to_asset(const int32_t value[3], const Frame& frame, int64_t across, int64_t along, float* out) {
     for (int c = 0; c < 3; ++c) {
         const int64_t sum =
-            (int64_t(value[0]) * frame.row[0][c] + int64_t(value[1]) * frame.row[1][c]) * ratio +
-            int64_t(value[2]) * frame.row[2][c] * 16;
+            (int64_t(value[0]) * frame.row[0][c] + int64_t(value[1]) * frame.row[1][c]) * across +
+            int64_t(value[2]) * frame.row[2][c] * along;
         const int64_t scaled = rounded(sum, 1024);  // 1/16 · 1/16384 → 1/256
         if (magnitude(scaled) > (int64_t(1) << 30)) return false;
         store(out + c, int32_t(scaled));
@@ -130,8 +130,9 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
         if (magnitude(mean) > max_mean) return false;
         store(out + c, int32_t(mean));
     }
+    const bool drifts = drop && life == 1;  // how far a drop goes within a step need not be known as well as where it is
     for (uint32_t k = 1; k < raw.position_terms; ++k)
-        if (!to_asset(raw.position[k], frame, ratio, out + 3 * k)) return false;
+        if (!to_asset(raw.position[k], frame, drifts ? steps.ratio : ratio, drifts ? steps.ratio : 16, out + 3 * k)) return false;
     for (int c = 0; c < 3 && !drop; ++c) {
         const int64_t twice = 2 * (int64_t(raw.slip[0]) * frame.row[0][c] + int64_t(raw.slip[1]) * frame.row[1][c]);
         const int64_t slip = rounded(twice, one);
@@ -146,7 +147,7 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
     }
     store(out, raw.axis[0]), store(out + 1, raw.axis[1]), store(out + 2, 0);
     for (uint32_t k = 1; k < raw.second_terms; ++k)
-        if (!to_asset(raw.second[k], frame, 16, out + 3 * k)) return false;
+        if (!to_asset(raw.second[k], frame, 16, 16, out + 3 * k)) return false;
     return true;
 }
 

@@ -22,11 +22,13 @@ struct LatticeSteps {
     uint16_t ratio;  ///< tangential step / step, in 1/16: 16 … 1024
     float slip_step = 0;  ///< of slip, m/s; 0: points have none
     int32_t shape_unit = fine_shape_unit;
+    bool lone_drops_drift = true;  ///< drops of one sample have a second term of motion: how far they go in a step; not before version 7
 };
 /// Finite, positive, ratio in range; says nothing else of the values.
 bool valid(const LatticeSteps& steps) noexcept;
 inline LatticeSteps steps_of(const Header& h, const WindowRecord& w) noexcept {
-    return {w.step, w.normal_step, {h.lower[0], h.lower[1], h.lower[2]}, w.ratio, w.slip_step, h.version < version_6 ? coarse_shape_unit : fine_shape_unit};
+    return {w.step, w.normal_step, {h.lower[0], h.lower[1], h.lower[2]}, w.ratio, w.slip_step, h.version < version_6 ? coarse_shape_unit : fine_shape_unit,
+            h.version >= version_7};
 }
 
 /// Largest integer whose square is no more than x.

@@ -20,7 +20,8 @@ enum Version : uint32_t {
     version_4 = 4,  ///< 2026-11: smaller records, steps by window; lives by their neighbours'
     version_5 = 5,  ///< 2026-11: walls: the liquid is cut off at sides of its bounds
     version_6 = 6,  ///< 2026-11: shapes of drops on a lattice four times as fine
-    current_version = version_6,
+    version_7 = 7,  ///< 2026-11: drops of one sample tell where they go
+    current_version = version_7,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.

@@ -15,8 +15,9 @@
 // at its samples, φ_k the orthonormal Fourier-extension basis of length death − birth + 1, and go on a spline through
 // these between them (fourier_extension.h). A track that is born (not carried over the window's border) is also active
 // before its birth, one that dies after its death: there it moves along the tangent of its end and its activity falls
-// linearly from 1 to 0, a point's within half a sample, a drop's within one, or half a one if its life is one sample,
-// which has no tangent. Elsewhere activity is 1; outside, the track is absent.
+// linearly from 1 to 0, a point's within half a sample, a drop's within one. A life of one sample has no tangent; a drop may
+// have a second term of motion, φ_1(s) = s, by which it drifts, and its activity falls within half a sample where it has none.
+// Elsewhere activity is 1; outside, the track is absent.
 #pragma once
 #include <cstdint>
 
@@ -34,7 +35,7 @@ enum TrackFlags : uint8_t {
 struct Track {
     uint32_t first_coefficient;  ///< into TrackBlock::coefficients
     uint8_t birth, death, flags;
-    uint8_t position_terms;      ///< 1 … life length; coefficients stored [term][channel]
+    uint8_t position_terms;      ///< 1 … life length (2 of a drop of one sample); coefficients stored [term][channel]
     uint8_t second_terms;        ///< normal or shape; stored after the position's, [term][channel]
     int8_t slip[3];              ///< of a point, in TrackBlock::slip_unit, asset axes
 };

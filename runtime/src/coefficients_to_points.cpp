@@ -48,12 +48,13 @@ void make_row(const TimeRows* rows, const format::Track& track) {
     made_of(rows)[row] = 1;
     const bool cosine = (track.flags & format::track_cosine) != 0;
     float* out = floats_of(rows, row);
-    format::spline_row(rows->tables, life, cosine, rows->s - track.birth, rows->steps, format::most_terms(life, cosine), out, out + rows->stride);
+    const uint32_t terms = life == 1 ? 2 : format::most_terms(life, cosine);
+    format::spline_row(rows->tables, life, cosine, rows->s - track.birth, rows->steps, terms, out, out + rows->stride);
 }
 
 /// 0: absent. Points fade within half a step, so that in the middle between two frames the surface is that of those that live through both:
 /// others, going on along their tangents or coming along them, stand beside it, and are seen as scraps and lumps (cooker/README.md, "Between
-/// frames"). Drops are all there is of most pieces and shrink until the next frame; but of one sample, which tells no motion, they would
+/// frames"). Drops are all there is of most pieces and shrink until the next frame; but those of one sample that do not drift would
 /// stand where fast liquid only will be, or was.
 float activity_at(const format::TrackBlock& block, uint32_t index, double s) {
     const format::Track& track = block.tracks[index];
@@ -61,7 +62,7 @@ float activity_at(const format::TrackBlock& block, uint32_t index, double s) {
     if (!before && !after) return 1;
     if (!(track.flags & (before ? format::track_born : format::track_dies))) return 0;
     const double away = before ? track.birth - s : s - track.death;
-    const bool whole_step = index >= block.point_count && track.birth < track.death;
+    const bool whole_step = index >= block.point_count && (track.birth < track.death || track.position_terms > 1);
     return float(1 - away * (whole_step ? 1 : 2));
 }
 
