@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -287,6 +288,44 @@ TEST_CASE("liquid that is gone for some frames, and liquid that comes late") {
         CHECK(decoded.triangles.empty() == !there(int(i)));
         if (there(int(i))) CHECK(distance(of_frame(int(i)), decoded).p99 < 2 * cooked.report.target_p99);
     }
+}
+
+TEST_CASE("a drop that one frame alone shows comes and goes the way the liquid does, and shrinks by half half way") {
+    const glm::vec3 place(0, 1.5f, -0.2f), drift(0, -0.5f, 0.1f);  // metres; metres a frame
+    const auto drop = [&] {
+        Mesh mesh = sphere(12, 0.09f);
+        for (glm::vec3& x : mesh.positions) x += place, mesh.velocities.push_back(float(fps) * drift);
+        return mesh;
+    };
+    Cooked cooked([&](int i) {
+        Mesh mesh = of_frame(i);
+        if (i == 4) append(mesh, drop());
+        return mesh;
+    });
+    cooked.cook();
+    AssetPlayer player(cooked.asset);
+    const auto flying = [&](double frame) {
+        Mesh mesh = player.mesh(frame / fps);
+        std::erase_if(mesh.triangles, [&](const Triangle& t) { return mesh.positions[t[0]].y < 0.7f || mesh.positions[t[0]].z > 0.5f; });
+        return part_of(mesh, mesh.triangles);
+    };
+    const double whole_volume = signed_volume(flying(4));
+    CHECK(whole_volume == doctest::Approx(signed_volume(drop())).epsilon(0.05));
+    std::array<float, 2> reach{1e9f, -1e9f};  // of the chunks, along y
+    for (const auto& chunk : read_directory(cooked.asset).chunks) reach = {std::min(reach[0], chunk.lower[1]), std::max(reach[1], chunk.upper[1])};
+    for (const float away : {-0.5f, 0.5f}) {
+        CAPTURE(away);
+        const Mesh mesh = flying(4 + away);
+        REQUIRE(!mesh.triangles.empty());
+        CHECK(signed_volume(mesh) == doctest::Approx(0.5 * whole_volume).epsilon(0.05));
+        glm::vec3 lower(1e9f), upper(-1e9f);
+        for (const glm::vec3& x : mesh.positions) lower = glm::min(lower, x), upper = glm::max(upper, x);
+        CHECK(glm::distance(0.5f * (lower + upper), place + away * drift) < 0.02f);
+        for (const glm::vec3& v : mesh.velocities) CHECK(glm::distance(v, float(fps) * drift) < 0.05f * float(fps) * glm::length(drift));
+    }
+    CHECK(reach[1] > place.y - drift.y);
+    CHECK(flying(2.99).triangles.empty());
+    CHECK(flying(5).triangles.empty());
 }
 
 TEST_CASE("a single frame, and windows of a single frame") {

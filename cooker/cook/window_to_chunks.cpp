@@ -32,6 +32,15 @@ bool few_are_brief(const std::vector<QuantisedTrack>& tracks) {
     return brief <= most_brief_share * all;
 }
 
+/// How far a track still goes where its life ends, until it has faded: a step at most.
+glm::vec3 beyond_end(const TrackSamples& track, size_t k) {
+    const std::vector<glm::vec3>& at = track.position;
+    if (at.size() == 1) return track.drift;
+    const float steps = track.drop ? 1.f : 0.5f;
+    if (k == 0) return steps * (at[0] - at[1]);
+    return k + 1 == at.size() ? steps * (at[k] - at[k - 1]) : glm::vec3(0);
+}
+
 /// Bounds of what the tracks of a chunk carry, over the window: points widened by the reach of their patches, drops by themselves.
 void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, float around) {
     chunk.lower = glm::vec3(1e30f), chunk.upper = glm::vec3(-1e30f);
@@ -43,7 +52,7 @@ void bound(ChunkToWrite& chunk, const std::vector<const TrackSamples*>& tracks, 
                 const auto& s = track->shape[k];
                 wide = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + 2 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
             }
-            const glm::vec3 reach = wide + glm::abs(track->drift);
+            const glm::vec3 reach = wide + glm::abs(beyond_end(*track, k));
             chunk.lower = glm::min(chunk.lower, p - reach), chunk.upper = glm::max(chunk.upper, p + reach);
         }
 }
