@@ -34,6 +34,7 @@ constexpr double ball = 4 * std::numbers::pi / 3;
 constexpr float flattest = 0.12f;       // shortest over longest axis
 constexpr float reach = 2;              // edges that a drop may land off where its velocity takes it
 constexpr float most_growth = 2;        // of volume from frame to frame, either way
+constexpr float most_drift = 100;       // edges from frame to frame: a velocity beyond is none
 
 /// Volume integrals of a closed piece, about `base`: 1, x, x xᵀ.
 struct Moments {
@@ -274,6 +275,7 @@ std::vector<TrackSamples> track_drops(const Window& window, const std::vector<st
             track.death = uint8_t(s);
             track.position.push_back(drops[d].centre), track.shape.push_back(drops[d].shape);
             track.drift = to_next * drops[d].velocity;
+            if (!(glm::length(track.drift) < most_drift * window.frames[size_t(s)]->edge)) track.drift = glm::vec3(0);
             alive.push_back(track_of[d]), at.push_back(&drops[d]);
         }
     }
