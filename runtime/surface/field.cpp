@@ -266,7 +266,7 @@ void place_drops(Field& f, const format::DropSet& drops) {
         const uint32_t i = f.drop_source[at];
         const Shape shape(drops, i);
         const float k = 1 / shape.determinant;
-        // A drop that is born or dies grows and shrinks with its activity.
+        // A drop that is born or dies grows and shrinks with its activity, from and to a size that is not drawn.
         const float grow = 1 / std::cbrt(std::max(std::min(drops.activity[i], 1.f), 1e-6f));
         for (int a = 0; a < 6; ++a) f.inverse[a][at] = shape.cofactor[a] * k * grow;
         f.dx[at] = drops.x[i], f.dy[at] = drops.y[i], f.dz[at] = drops.z[i];
