@@ -143,6 +143,33 @@ TEST_CASE("cook: a rate that cannot be met, and one beside an error") {
     CHECK(get_file(folder / "a.rill") == get_file(clip().asset));
 }
 
+TEST_CASE("cook: errors there are no numbers for, and an output that is no asset") {
+    const TestFolder folder;
+    const std::string cook = "cook " + clip().input + " --quiet -o ";
+    for (const char* error : {"1e-30m", "0.00001%", "1000e", "1e30e"}) {
+        const Result result = run_rill(cook + (folder / "a.rill") + " --error " + error);
+        CAPTURE(result.text);
+        CHECK(result.code == 1);
+        CHECK(has(result, std::string("--error '") + error + "' is"));
+    }
+    const Result fine = run_rill(cook + (folder / "a.rill") + " --error 0.0001e");
+    CHECK(fine.code == 2);
+    CHECK(has(fine, "--error is too small for this liquid"));
+    CHECK(!fs::exists(folder / "a.rill"));
+    const std::string source = plain_ply(Clip::frame(1));
+    put_file(folder / "f1.ply", source);
+    for (const std::string& command : {"cook " + (folder / "f1.ply") + " --force", cook.substr(0, cook.size() - 4), "link " + (folder / "f1.ply")}) {
+        const Result result = run_rill(command + " --quiet -o " + (folder / "f1.ply"));
+        CAPTURE(result.text);
+        CHECK(result.code == 2);
+        CHECK(has(result, "f1.ply: is there already and no Rill asset"));
+        CHECK(get_file(folder / "f1.ply") == source);
+    }
+    put_file(folder / "b.rill", "");  // as mktemp leaves it
+    CHECK(run_rill(cook + (folder / "b.rill") + " --error 0.4e --window 3").code == 0);
+    CHECK(get_file(folder / "b.rill") == get_file(clip().asset));
+}
+
 TEST_CASE("cook: bad input is 2, one line, and no asset") {
     const TestFolder folder;
     const std::string asset = folder / "a.rill", input = folder / "in";
@@ -180,6 +207,13 @@ TEST_CASE("cook: bad input is 2, one line, and no asset") {
     put_file(input + "/mesh/lVelMesh_0001.uni", gzip(mantaflow_velocity({})));
     put_file(input + "/mesh/fluid_mesh_0001.bobj.gz", packed);
     check("velocities for 0 vertices");
+    fs::remove_all(input);
+    for (int number : {1, 2, 3}) {
+        Mesh wide = Clip::frame(number);
+        for (size_t i = 0; i < wide.positions.size(); ++i) wide.positions[i] *= 1e6f, wide.velocities[i] *= 1e6f;
+        put_file(input + "/f" + std::to_string(number) + ".ply", plain_ply(wide));
+    }
+    check("m across, more than 1e+05 m");
     const Result result = run_rill("cook " + clip().input + " -o " + (folder / "no/where.rill") + " --quiet");
     CHECK(result.code == 2);
     CHECK(has(result, "where.rill"));

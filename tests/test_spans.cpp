@@ -184,6 +184,8 @@ TEST_CASE("link names what does not fit, and writes nothing") {
     fails({parts[0], others[1]}, "not of the same cook");
     put_file(clip.folder / "whole.rill", whole());
     fails({clip.folder / "whole.rill"}, "no part");
+    put_file(clip.folder / "none of 9", "");
+    fails({clip.folder / "none of 9"}, "no part given holds a span");
 }
 
 TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are cooked again") {

@@ -136,6 +136,12 @@ TEST_CASE("velocity of something else, no velocity, nothing that moves") {
     CHECK(fit.factor == 1);
     CHECK_FAULT(warning, "does not carry", "estimate");
     for (int frame = 3; frame <= 9; ++frame) {
+        Mesh mesh = ball(frame, true, 0);
+        put_file(folder / (std::to_string(frame) + ".ply"), plain_ply(mesh));
+    }
+    CHECK_FALSE(fit_of(*open_sequence(folder.path.string(), {}), warning).conclusive);
+    CHECK_FAULT(warning, "velocities are 0 where the surface moves", "estimate");
+    for (int frame = 3; frame <= 9; ++frame) {
         Mesh mesh = ball(0, true, 1);
         put_file(folder / (std::to_string(frame) + ".ply"), plain_ply(mesh));
     }

@@ -67,7 +67,7 @@ glm::dmat3 matrix_of(const Shape& v) {
 
 int32_t checked(double value) {
     if (!(std::abs(value) < format::max_symbol))
-        throw InputError("a track moves too far for this quantiser step");
+        throw InputError("--error is too small for this liquid: a point goes more steps of that size than the format counts");
     return int32_t(std::lround(value));
 }
 int32_t quantised(double value, double step, const Rounding& rounding) {

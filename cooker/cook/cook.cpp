@@ -137,6 +137,21 @@ double duration(const SequenceInfo& info) {
     return n > 1 && between > 0 ? between * n / (n - 1) : n / info.frames_per_second;
 }
 
+/// The aim, if there are numbers for it: squares and cubes of what is much larger leave those of floats.
+Aim checked_aim(const std::string& input, const CookSettings& settings, const Survey& survey, double seconds) {
+    constexpr double largest = 1e5, finest = 1e-6;  // metres; of the diagonal
+    const double diagonal = survey.diagonal();
+    char text[200];
+    if (diagonal > largest) {
+        std::snprintf(text, sizeof text, ": the liquid is %.4g m across, more than %.4g m: what is a unit of it? --scale says how many metres", diagonal, largest);
+        throw InputError(input + text);
+    }
+    const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, diagonal, seconds);
+    if (aim.p99 == 0 || diagonal == 0 || (aim.p99 >= finest * diagonal && aim.p99 <= diagonal)) return aim;
+    std::snprintf(text, sizeof text, "' is %.4g m: it must be from %.4g to %.4g m for this liquid", aim.p99, finest * diagonal, diagonal);
+    throw UsageError("--error '" + settings.error + text);
+}
+
 /// As format::Header::walls.
 uint32_t header_walls(const Survey& survey) {
     const uint32_t bevel = uint32_t(std::lround(survey.bevel / survey.edge * float(format::bevel_parts)));
@@ -183,7 +198,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
         report.json = stored, report.up_to_date = report.target_met = true;
         return report;
     }
-    if (fs::is_directory(output)) throw InputError(output + ": cannot be written: is a directory");
+    check_output(output);
     if (job.share.first == job.share.end) {  // fewer spans than segments
         write_file(output, "");
         report.target_met = true;
@@ -193,7 +208,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     const uint32_t frames = job.plan.frames;
     const Survey survey = survey_input(*job.reader, settings.read, settings.survey, job.input_hash, settings.jobs,
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });
-    const Aim aim = aim_of(settings.error, settings.bitrate, survey.edge, survey.diagonal(), duration(job.reader->info()));
+    const Aim aim = checked_aim(input, settings, survey, duration(job.reader->info()));
     const CookFacts facts = {cook_json(job, settings, survey, aim), job.reader->info().frames_per_second, uint32_t(settings.layers),
                              survey.edge, survey.lower, survey.upper, header_walls(survey)};
     const auto reader = apply_fit(cut_to_closed(std::move(job.reader), survey.cut), survey.fit);

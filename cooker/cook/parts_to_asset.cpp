@@ -2,10 +2,13 @@
 #include "cook/parts_to_asset.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "cook/rate_search.h"
 #include "tracks/pipeline.h"
@@ -120,7 +123,8 @@ std::vector<Part> gather(const std::vector<std::string>& paths) {
         if (parts.back().cook != parts.front().cook)
             throw InputError(path + ": is not of the same cook as " + parts.front().directory.path + ": input, settings or tool differ");
     }
-    if (parts.empty()) throw InputError((paths.empty() ? std::string("link") : paths.front()) + ": nothing to link");
+    if (parts.empty()) throw InputError((paths.empty() ? std::string("link") : paths.front()) + ": nothing to link" +
+                                         (paths.empty() ? "" : ": no part given holds a span, for they are of more segments than there are spans"));
     std::sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.spans.front().span < b.spans.front().span; });
     for (size_t i = 1; i < parts.size(); ++i) {
         const SpanResult &before = parts[i - 1].spans.back(), &after = parts[i].spans.front();
@@ -237,7 +241,19 @@ Linked judge(const json& stored, uint64_t file_bytes) {
     return linked;
 }
 
+void check_output(const std::string& path) {
+    std::error_code error;
+    if (std::filesystem::is_directory(path, error)) throw InputError(path + ": cannot be written: is a directory");
+    if (!std::filesystem::is_regular_file(path, error)) return;
+    std::array<char, sizeof format::magic> begins{};
+    std::ifstream file(path, std::ios::binary);
+    file.read(begins.data(), begins.size());
+    if (file.gcount() > 0 && std::memcmp(begins.data(), format::magic, size_t(file.gcount())) != 0)
+        throw InputError(path + ": is there already and no Rill asset, so it is not overwritten; delete it or choose another name");
+}
+
 Linked link_asset(const std::vector<std::string>& paths, const std::string& output) {
+    check_output(output);
     const std::vector<Part> parts = gather(paths);
     const uint32_t count = parts.front().cook.at("span_count"), first = parts.front().spans.front().span, last = parts.back().spans.back().span;
     if (first != 0)
@@ -255,6 +271,7 @@ Linked link_asset(const std::vector<std::string>& paths, const std::string& outp
 }
 
 void link_part(const std::vector<std::string>& paths, const std::string& output) {
+    check_output(output);
     const std::vector<Part> parts = gather(paths);
     AssetWriter writer(output);
     const Joined joined = join(parts, writer);

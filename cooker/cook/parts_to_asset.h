@@ -58,6 +58,8 @@ struct Linked : Verdict {
 Linked judge(const nlohmann::json& stored, uint64_t file_bytes);
 inline constexpr double met_within = 0.1;  // of the target
 
+/// Throws InputError where there is something that is neither an asset nor empty: a source given as output must not be lost.
+void check_output(const std::string& path);
 /// All spans of the cook, from parts in any order, into the finished asset. Empty files are segments without spans.
 /// Throws InputError naming the part and what does not fit, or the frames that are missing.
 Linked link_asset(const std::vector<std::string>& parts, const std::string& output);

@@ -19,6 +19,7 @@ struct Moved {
     double seconds = 0;       ///< to the neighbour; negative: it lies before
     float cap = 0;            ///< distances count no more than this
     double still = 0;
+    size_t resting = 0;       ///< others whose surface moved, and their velocity is 0
     const SurfaceIndex* neighbour = nullptr;
 
     double miss(double factor) const {
@@ -44,7 +45,9 @@ Moved moved(const Mesh& mesh, const SurfaceIndex& neighbour, double seconds) {
     for (size_t i = 0; i < tried; ++i) {
         const size_t v = mesh.velocities.size() * i / tried;
         const float distance = neighbour.closest(mesh.positions[v], 50 * edge).distance;
-        if (distance > 0.25f * edge && distance < 50 * edge && mesh.velocities[v] != glm::vec3(0)) candidates.push_back({v, distance});
+        if (!(distance > 0.25f * edge && distance < 50 * edge)) continue;
+        if (mesh.velocities[v] != glm::vec3(0)) candidates.push_back({v, distance});
+        else ++result.resting;
     }
     const size_t kept = std::min(candidates.size(), most_samples);
     for (size_t i = 0; i < kept; ++i) {
@@ -131,7 +134,7 @@ struct Pairs {
     std::vector<size_t> first;  ///< frame of each
     size_t apart = 1;           ///< frames
     glm::vec3 lower{1e30f}, upper{-1e30f};
-    size_t samples = 0;
+    size_t samples = 0, resting = 0;
     double still = 0;  ///< sum over the samples
 };
 Pairs look_at(const SequenceReader& reader, size_t apart) {
@@ -155,7 +158,7 @@ Pairs look_at(const SequenceReader& reader, size_t apart) {
         pairs.backward.push_back(moved(b, *pairs.indices[2 * p], -seconds));
     }
     for (const auto* all : {&pairs.forward, &pairs.backward})
-        for (const Moved& m : *all) pairs.samples += m.position.size(), pairs.still += m.still;
+        for (const Moved& m : *all) pairs.samples += m.position.size(), pairs.resting += m.resting, pairs.still += m.still;
     return pairs;
 }
 /// Frames as far apart as it takes for enough to move: at 120 Hz little does from one to the next.
@@ -185,7 +188,11 @@ VelocityFit check_velocity(const SequenceReader& reader, const std::function<voi
     fit.meaning = info.velocity;
     if (info.velocity == VelocityMeaning::none || info.numbers.size() < 2) return fit;
     const Pairs pairs = telling_pairs(reader);
-    if (pairs.samples < fewest_samples) return fit;  // still water: nothing to learn, and nothing to lose
+    if (pairs.samples < fewest_samples) {  // still water: nothing to learn, and nothing to lose
+        if (warn && pairs.resting >= 4 * fewest_samples)
+            warn(info.path + ": velocities are 0 where the surface moves; wrong attribute? try --velocity NAME or --velocity estimate");
+        return fit;
+    }
     const Best ahead = best_factor(pairs.forward), back = best_factor(pairs.backward);
     // What the source states is right unless the frames say clearly otherwise; a long way hardly tells directions apart.
     const bool forward = info.velocity == VelocityMeaning::forward || (info.velocity == VelocityMeaning::unknown && pairs.apart > 1);
