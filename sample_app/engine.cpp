@@ -73,8 +73,13 @@ void JobPool::submit(void* user, rill::Task task, void* context, uint32_t count,
 void JobPool::help(void* user) {
     auto& pool = *static_cast<JobPool*>(user);
     std::unique_lock lock(pool.mutex_);
-    // Never a job that may wait: the frame would wait for it.
-    if (pool.run_one(lock, 0, false)) return;
+    // Threads that drive different players may wait at the same time, and there is one worker 0.
+    if (!pool.helped_) {
+        pool.helped_ = true;
+        const bool ran = pool.run_one(lock, 0, false);  // never a job that may wait: the frame would wait for it
+        pool.helped_ = false;
+        if (ran) return;
+    }
     lock.unlock();
     std::this_thread::yield();
 }

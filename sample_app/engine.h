@@ -52,7 +52,7 @@ private:
     std::mutex mutex_;
     std::condition_variable wake_;
     std::deque<Batch> now_, later_;
-    bool stopping_ = false;
+    bool stopping_ = false, helped_ = false;  ///< helped_: there is a worker 0 just now
     std::vector<std::thread> threads_;
 };
 

@@ -8,9 +8,9 @@
 namespace player {
 
 std::string cut_names(uint32_t cut) {
-    static const char* const names[] = {"points", "vertices", "indices", "ranges", "time", "residency", "late"};
+    static const char* const names[] = {"points", "vertices", "indices", "ranges", "time", "residency", "late", "damaged"};
     std::string out;
-    for (int bit = 0; bit < 7; ++bit)
+    for (size_t bit = 0; bit < sizeof names / sizeof names[0]; ++bit)
         if (cut & (1u << bit)) out += (out.empty() ? "" : ", ") + std::string(names[bit]);
     return out.empty() ? "nothing" : out;
 }

@@ -96,6 +96,10 @@ TEST_CASE("points are handed out, and a drop is drawn beside them") {
     }
     for (uint32_t i = 500; i < 600; ++i) CHECK(points[i] == glm::vec3(0));
     CHECK(rill::cooker::topology(mesh_of(playing)).components == 2);
+    std::vector<uint8_t> packed(1 + 13 * 500);  // of any stride, anywhere
+    playing.target.point_position = {packed.data() + 1, 13};
+    CHECK(playing.draw(0.25) == Status::ok);
+    for (uint32_t i = 0; i < 500; ++i) CHECK(std::memcmp(packed.data() + 1 + 13 * i, &points[i], sizeof points[i]) == 0);
 }
 
 TEST_CASE("a time on a window's border belongs to the later window, the clip's end to the last") {

@@ -3,8 +3,10 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
+#include <atomic>
 #include <limits>
 #include <set>
+#include <thread>
 
 using namespace harness;
 using rill::Status;
@@ -193,6 +195,7 @@ TEST_CASE("failed reads come back, later; rejected chunks never") {
     for (int i = 0; i < 20; ++i) playing.draw(0);
     CHECK(playing.stats.reads_failed == 3 * 18);
     CHECK(playing.stats.chunks_rejected == 1);
+    CHECK(playing.stats.cut == rill::cut_damaged);
     CHECK(tries[chunk_of(bytes, 1).offset] == 4);
     REQUIRE(opened.log.size() == 1);
     CHECK(opened.log[0].rfind("chunk 1 (window 0, layer 0, block 1) rejected: ", 0) == 0);
@@ -325,6 +328,28 @@ TEST_CASE("waiting for data ends, whatever the IO does") {
     hopeless.frame.wait_for_data = true;
     CHECK(hopeless.draw(0) == Status::clipped);
     CHECK(hopeless.stats.chunks_late == 6);
+}
+
+TEST_CASE("of threads that wait at once, one at a time helps as worker 0") {
+    rill::ThreadPool* pool = rill::start_threads(2);
+    const rill::Jobs jobs = rill::thread_jobs(pool);
+    struct Shared {
+        std::atomic<uint32_t> busy[3]{}, clashes{0}, left{4000};
+    } shared;
+    const rill::Task task = [](void* user, uint32_t, uint32_t worker) {
+        Shared& s = *static_cast<Shared*>(user);
+        if (s.busy[worker].fetch_add(1)) ++s.clashes;
+        std::this_thread::yield();
+        s.busy[worker].fetch_sub(1);
+        --s.left;
+    };
+    jobs.submit(jobs.user, task, &shared, 4000, true);
+    std::vector<std::thread> drivers;
+    for (int i = 0; i < 3; ++i)
+        drivers.emplace_back([&] { while (shared.left) jobs.help(jobs.user); });
+    for (std::thread& driver : drivers) driver.join();
+    CHECK(shared.clashes == 0);
+    rill::stop_threads(pool);
 }
 
 TEST_CASE("waiting gets along with files and threads") {

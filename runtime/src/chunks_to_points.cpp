@@ -3,6 +3,7 @@
 // fixed places. The order of points is that of the pieces, whoever runs them.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "pipeline.h"
 
@@ -76,10 +77,8 @@ format::DropSet slice(const format::DropSet& all, uint32_t offset) {
 
 void write_vector(const Stream& stream, uint32_t index, float x, float y, float z) {
     if (!stream.data) return;
-    auto* out = reinterpret_cast<float*>(static_cast<uint8_t*>(stream.data) + uint64_t(index) * stream.stride);
-    out[0] = x;
-    out[1] = y;
-    out[2] = z;
+    const float vector[3] = {x, y, z};
+    std::memcpy(static_cast<uint8_t*>(stream.data) + uint64_t(index) * stream.stride, vector, sizeof vector);  // of any stride
 }
 
 /// The points themselves, for those who want to see them.

@@ -24,6 +24,7 @@ void count_drawn(const Player& player, Stats& stats) {
         }
         missing_layer = std::min<uint32_t>(missing_layer, record.layer);
         if (state != ChunkState::rejected) ++stats.chunks_late;
+        else stats.cut |= cut_damaged;
     }
     stats.layers_drawn = missing_layer;
     if (stats.chunks_late) stats.cut |= player.residency.no_room ? cut_residency : cut_late;

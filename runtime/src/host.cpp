@@ -49,7 +49,7 @@ struct ThreadPool {
     std::deque<Batch> needed, prefetch;  ///< what the frame waits for goes first
     std::atomic<uint64_t> submitted{0};  ///< batches so far
     std::vector<std::thread> threads;
-    bool stopping = false;
+    bool stopping = false, helped = false;  ///< helped: there is a worker 0 just now
 
     /// Takes one task out under the lock and runs it outside. False: there is none.
     bool run_one(std::unique_lock<std::mutex>& lock, uint32_t worker) {
@@ -128,7 +128,9 @@ Jobs thread_jobs(ThreadPool* pool) noexcept {
     jobs.help = [](void* user) {
         auto& pool = *static_cast<ThreadPool*>(user);
         std::unique_lock<std::mutex> lock(pool.mutex);
-        const bool helped = pool.run_one(lock, 0);
+        // Threads that drive different players may wait at the same time, and there is one worker 0.
+        bool helped = false;
+        if (!pool.helped) pool.helped = true, helped = pool.run_one(lock, 0), pool.helped = false;
         lock.unlock();
         if (!helped) std::this_thread::yield();
     };

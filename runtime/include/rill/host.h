@@ -9,7 +9,7 @@ namespace rill {
 /// malloc-family, 64-byte alignment honoured.
 Memory heap_memory() noexcept;
 
-/// `workers` threads run tasks; the thread in end_frame() helps as worker 0 (so Jobs::workers = workers + 1).
+/// `workers` threads run tasks; the thread in end_frame() helps as worker 0, one at a time (so Jobs::workers = workers + 1).
 /// workers 0: everything inline. Out of work, a thread looks out for more for a tenth of a millisecond before it sleeps. Null when threads
 /// cannot be started.
 struct ThreadPool;

@@ -38,7 +38,7 @@ struct Memory {
 };
 
 /// One unit of work: `index` < count of its submit(); `worker` < Jobs::workers, and no two tasks
-/// that run at the same time share a worker number.
+/// that run at the same time share a worker number. It needs up to 128 KB of stack.
 using Task = void (*)(void* context, uint32_t index, uint32_t worker);
 
 /// The engine's threads. submit == nullptr: all work runs inside end_frame() on the calling thread.
@@ -48,7 +48,8 @@ struct Jobs {
     /// Runs task(context, 0 … count-1, worker) some time, in any order. Must not wait.
     /// needed_this_frame is false for prefetch work that may yield to the engine's own.
     void (*submit)(void* user, Task task, void* context, uint32_t count, bool needed_this_frame);
-    /// Called in a loop while end_frame() waits: run one job, or yield.
+    /// Called in a loop while end_frame() waits: run one job, or yield. By several threads at once when several drive Players:
+    /// each needs a worker number of its own, or only one of them at a time runs a job.
     void (*help)(void* user);
 };
 
@@ -118,15 +119,15 @@ struct Limits {
     uint64_t resident_bytes;   ///< decoded windows and reads in flight
     uint32_t points;           ///< alive at one moment
     uint32_t vertices;         ///< scratch of the mesher; Target has capacities of its own
-    uint32_t indices;
-    uint32_t reads_in_flight;
+    uint32_t indices;          ///< for a Target that takes a whole frame; the player itself needs none
+    uint32_t reads_in_flight;  ///< 4096 at most
 };
 /// What plays this asset whole, at source resolution, with prefetch of one window either way.
 Limits suggest_limits(const Asset* asset) noexcept;
 /// Exactly what create() will allocate, in bytes.
 uint64_t footprint(const Asset* asset, const Limits& limits) noexcept;
 Status create(Asset* asset, const Limits& limits, Player** out) noexcept;
-/// pending while its reads are out: they still point at its memory.
+/// pending while its reads are out: they still point at its memory; bad_argument between begin_frame() and end_frame().
 Status destroy(Player* player) noexcept;
 
 /// World space. Planes (n, d): n·x + d ≥ 0 inside; n of unit length.
@@ -144,14 +145,14 @@ struct Budget {
     uint32_t points;       ///< per frame
     uint32_t microseconds; ///< of a frame's work, from its first stage to its last: what is seen of the surface gets
                            ///< coarser. 0: no clock is read, and frames are repeatable
-    uint64_t read_bytes;   ///< asked for per frame
+    uint64_t read_bytes;   ///< asked for per frame; a chunk that is larger goes alone. Not with Frame::wait_for_data
 };
 /// May be mapped GPU memory: written once, never read back. null data = not wanted.
 struct Stream {
     void* data;
     uint32_t stride;  ///< bytes from one element to the next
 };
-/// One drawable piece: indices [first_index, first_index + index_count), asset space bounds.
+/// One drawable piece, `block` being its number: indices [first_index, first_index + index_count), asset space bounds.
 struct Range {
     uint32_t block, first_index, index_count;
     float lower[3], upper[3];
@@ -176,7 +177,7 @@ struct Frame {              ///< views and target must stay valid until end_fram
     bool loops;             ///< beyond one end of the clip comes the other: steers prefetch
     float asset_to_world[12];  ///< three rows of four: rotation·scale | translation
     const View* views;      ///< none: no culling, and cells of the source's size
-    uint32_t view_count;
+    uint32_t view_count;    ///< 16 at most
     Budget budget;
     Target* target;         ///< null: stream and decode only
     bool wait_for_data;     ///< end_frame() waits until all wanted chunks arrived (offline tools)
@@ -190,6 +191,7 @@ enum Cut : uint32_t {
     cut_time = 16,
     cut_residency = 32,
     cut_late = 64,
+    cut_damaged = 128,  ///< of the file: nothing to raise
 };
 struct Stats {
     uint32_t cut;  ///< Cut bits
