@@ -158,7 +158,7 @@ TEST_CASE("cook: errors there are no numbers for, and an output that is no asset
     CHECK(!fs::exists(folder / "a.rill"));
     const std::string source = plain_ply(Clip::frame(1));
     put_file(folder / "f1.ply", source);
-    for (const std::string& command : {"cook " + (folder / "f1.ply") + " --force", cook.substr(0, cook.size() - 4), "link " + (folder / "f1.ply")}) {
+    for (const std::string& command : {"cook " + (folder / "f1.ply") + " --force", cook.substr(0, cook.size() - 4), cook.substr(0, cook.size() - 4) + " --dry-run", "link " + (folder / "f1.ply")}) {
         const Result result = run_rill(command + " --quiet -o " + (folder / "f1.ply"));
         CAPTURE(result.text);
         CHECK(result.code == 2);

@@ -246,6 +246,7 @@ CookPlan plan_cook(const std::string& input, const std::string& output, const Co
     CookPlan plan;
     plan.key = job.key, plan.info = job.reader->info(), plan.spans = job.plan, plan.share = job.share;
     plan.up_to_date = !settings.force && !job.finished(output, settings.segments > 0).is_null();
+    check_output(output);
     for (uint32_t span = job.share.first; span < job.share.end && !settings.force; ++span) plan.finished += job.has(span) ? 1 : 0;
     plan.fit = check_velocity(*job.reader, settings.read.warn);
     return plan;
