@@ -204,7 +204,7 @@ bool Renderer::grow(const rill::Stats& stats) {
     want(rill::cut_vertices, in_->vertex_room, stats.vertices_wanted);
     want(rill::cut_indices, in_->index_room, stats.indices_wanted);
     want(rill::cut_points, in_->point_room, stats.points_wanted);
-    want(rill::cut_ranges, in_->range_room, std::max(stats.blocks_in_view, stats.blocks_drawn + 1));
+    want(rill::cut_ranges, in_->range_room, stats.ranges_wanted);
     return grown;
 }
 

@@ -12,6 +12,8 @@
 #include <cstring>
 #include <new>
 
+#include <nlohmann/json.hpp>
+
 namespace player {
 
 double now_seconds() {
@@ -198,6 +200,28 @@ static rill::Status wait_while_pending(Step step) {
     return status;
 }
 
+/// Even steps, as the header tells, unless the settings list the numbers.
+static std::vector<int> numbers_of(const rill::AssetInfo& info) {
+    std::vector<int> numbers(info.frames);
+    for (uint32_t i = 0; i < info.frames; ++i) numbers[i] = info.first_frame + static_cast<int>(i) * info.frame_step;
+    const nlohmann::json settings = nlohmann::json::parse(info.settings_json, nullptr, false);
+    const auto listed = settings.is_object() ? settings.find("frame_numbers") : settings.end();
+    if (listed == settings.end() || !listed->is_array() || listed->size() != numbers.size()) return numbers;
+    if (!std::all_of(listed->begin(), listed->end(), [](const nlohmann::json& n) { return n.is_number_integer(); })) return numbers;
+    const auto stated = listed->get<std::vector<int>>();
+    return std::is_sorted(stated.begin(), stated.end()) ? stated : numbers;
+}
+
+uint32_t Clip::nearest_frame(double seconds) const {
+    uint32_t low = 0, high = info_.frames - 1;  // the last frame not after `seconds`
+    while (low < high) {
+        const uint32_t middle = (low + high + 1) / 2;
+        if (frame_seconds(middle) <= seconds) low = middle;
+        else high = middle - 1;
+    }
+    return low + 1 < info_.frames && frame_seconds(low + 1) - seconds < seconds - frame_seconds(low) ? low + 1 : low;
+}
+
 bool Clip::open(const std::string& path, std::string& cause) {
     if (!reader_.open(path, cause)) return false;
     rill::Host host;
@@ -208,6 +232,7 @@ bool Clip::open(const std::string& path, std::string& cause) {
     rill::Status status = rill::open(host, reader_.io(), reader_.bytes(), &asset_);
     if (status == rill::Status::ok) status = wait_while_pending([&] { return rill::poll(asset_, &info_); });
     if (status == rill::Status::ok) {
+        numbers_ = numbers_of(info_);
         limits_ = rill::suggest_limits(asset_);
         status = rill::create(asset_, limits_, &player_);
     }

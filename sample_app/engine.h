@@ -100,6 +100,10 @@ public:
     const rill::Limits& limits() const { return limits_; }
     const CountingHeap& heap() const { return heap_; }
     double frame_seconds(uint32_t index) const { return rill::frame_seconds(asset_, index); }
+    /// The source's numbers of all frames, ascending.
+    const std::vector<int>& frame_numbers() const { return numbers_; }
+    /// Index of the frame nearest in time.
+    uint32_t nearest_frame(double seconds) const;
     rill::Status begin_frame(const rill::Frame& frame) { return rill::begin_frame(player_, frame); }
     rill::Status end_frame(rill::Stats* stats) { return rill::end_frame(player_, stats); }
 
@@ -111,6 +115,7 @@ private:
     rill::Player* player_ = nullptr;
     rill::AssetInfo info_{};
     rill::Limits limits_{};
+    std::vector<int> numbers_;
     std::string first_trouble_;  // of open(): logged before there is anybody to tell
     static void log(void* user, rill::Status status, const char* message);
 };

@@ -18,10 +18,16 @@ namespace {
 constexpr int most_tiles = 24;
 constexpr int tile_width = 320;
 
+/// What one picture shows.
+struct Moment {
+    int frame;       ///< the source's number; of moments between frames that of the one before
+    double seconds;  ///< in the clip
+};
+
 struct Headless {
     const Options& options;
     Clip clip;
-    std::vector<int> frames;
+    std::vector<Moment> moments;
     Bounds bounds;
     Camera camera;
     std::unique_ptr<OffscreenContext, EndOffscreen> context;
@@ -34,11 +40,13 @@ struct Headless {
 
     int open();
     int choose_frames();
+    void divide_steps();
+    int number_of(size_t picture) const { return options.substeps > 1 ? static_cast<int>(picture) : moments[picture].frame; }
     int measure_source();
     int start_renderer();
-    int decode(int frame);
+    int decode(const Moment& moment);
     int draw_source(int frame, Picture& out);
-    int draw(int frame, Picture& out);
+    int draw(const Moment& moment, Picture& out);
     int run();
 };
 
@@ -54,31 +62,52 @@ int Headless::open() {
 
 int Headless::choose_frames() {
     FrameRange range = options.frames;
-    if (!options.asset.empty()) {
-        const int first = clip.info().first_frame, last = first + static_cast<int>(clip.info().frames) - 1;
-        if (!range.given) range = {true, first, last, 1};
-        if (range.first < first || range.last > last)
-            return complain(exit_usage, "--frames",
-                            "the asset has frames " + std::to_string(first) + ":" + std::to_string(last));
+    if (options.asset.empty()) {
+        for (int64_t frame = range.first; frame <= range.last; frame += range.step) moments.push_back({static_cast<int>(frame), 0.0});
+        return exit_ok;
     }
-    for (int64_t frame = range.first; frame <= range.last; frame += range.step) frames.push_back(static_cast<int>(frame));
-    // A sheet alone needs no more frames than it shows.
-    const int all = static_cast<int>(frames.size());
+    const std::vector<int>& numbers = clip.frame_numbers();
+    if (!range.given) range = {true, numbers.front(), numbers.back(), 1};
+    for (uint32_t i = 0; i < numbers.size(); ++i)
+        if (numbers[i] >= range.first && numbers[i] <= range.last && (int64_t(numbers[i]) - range.first) % range.step == 0)
+            moments.push_back({numbers[i], clip.frame_seconds(i)});
+    if (range.first < numbers.front() || range.last > numbers.back() || moments.empty()) {
+        const int step = clip.info().frame_step;
+        const bool all = numbers.back() - numbers.front() == step * (static_cast<int>(numbers.size()) - 1);
+        return complain(exit_usage, "--frames",
+                        "the asset has frames " + std::to_string(numbers.front()) + ":" + std::to_string(numbers.back()) +
+                            (step > 1 ? ":" + std::to_string(step) : "") + (all ? "" : ", of which some are missing"));
+    }
+    divide_steps();
+    // A sheet alone needs no more pictures than it shows.
+    const size_t all = moments.size();
     if (options.out.empty() && options.stats.empty() && !options.contact_sheet.empty() && all > most_tiles) {
-        for (int i = 0; i < most_tiles; ++i) frames[i] = frames[i * (all - 1) / (most_tiles - 1)];
-        frames.resize(most_tiles);
+        for (size_t i = 0; i < most_tiles; ++i) moments[i] = moments[i * (all - 1) / (most_tiles - 1)];
+        moments.resize(most_tiles);
     }
     return exit_ok;
+}
+
+/// Slow motion: `substeps` moments from each one to the next, evenly spaced.
+void Headless::divide_steps() {
+    std::vector<Moment> divided;
+    for (size_t i = 0; i + 1 < moments.size(); ++i)
+        for (int step = 0; step < options.substeps; ++step) {
+            const double share = static_cast<double>(step) / options.substeps;
+            divided.push_back({moments[i].frame, moments[i].seconds + share * (moments[i + 1].seconds - moments[i].seconds)});
+        }
+    divided.push_back(moments.back());
+    moments = std::move(divided);
 }
 
 /// Without an asset nobody knows the bounds: all frames are read once, so that the camera stands still.
 int Headless::measure_source() {
     if (!options.asset.empty()) return exit_ok;
     bool first = true;
-    for (const int frame : frames) {
+    for (const Moment& moment : moments) {
         Mesh mesh;
         std::string cause;
-        const std::string path = fill_pattern(options.source, frame);
+        const std::string path = fill_pattern(options.source, moment.frame);
         if (!read_ply(path, mesh, cause)) return complain(exit_bad_asset, path, cause);
         if (mesh.vertices.empty()) continue;
         bounds.lower = first ? mesh.bounds.lower : glm::min(bounds.lower, mesh.bounds.lower);
@@ -105,18 +134,17 @@ int Headless::start_renderer() {
     return exit_ok;
 }
 
-int Headless::decode(int number) {
-    const uint32_t index = static_cast<uint32_t>(number - clip.info().first_frame);
+int Headless::decode(const Moment& moment) {
     const auto views = camera.with_casters(options.width, options.height, bounds, renderer->to_sun());
     rill::Frame frame{};
-    frame.seconds = clip.frame_seconds(index);
+    frame.seconds = moment.seconds;
     frame.rate = 1.0f;
     for (int i = 0; i < 3; ++i) frame.asset_to_world[5 * i] = 1.0f;
     frame.views = views.data();
     frame.view_count = uint32_t(views.size());
     frame.budget = make_budget(options.detail, clip.info());
     frame.wait_for_data = true;
-    FrameRecord record{number, frame.seconds, 0.0, 0, 0, rill::Status::ok, {}};
+    FrameRecord record{moment.frame, moment.seconds, 0.0, 0, 0, rill::Status::ok, {}};
     do {
         rill::Target* target = renderer->map(options.look);
         frame.target = target;
@@ -128,12 +156,12 @@ int Headless::decode(int number) {
         record.triangles = target->indices_used / 3;
         renderer->unmap();
     } while (record.status == rill::Status::clipped && renderer->grow(record.stats));
-    const std::string where = options.asset + ": frame " + std::to_string(number);
+    const std::string where = options.asset + ": frame " + std::to_string(moment.frame);
     if (record.status < rill::Status::ok) return complain(exit_bad_asset, where, rill::text(record.status));
     if (record.stats.chunks_rejected > 0)
         return complain(exit_bad_asset, where, std::to_string(record.stats.chunks_rejected) + " damaged chunks");
     if (record.stats.reads_failed > 0) return complain(exit_bad_asset, where, "cannot be read to its end");
-    if (record.stats.cut) std::fprintf(stderr, "rill-player: frame %d: cut %s\n", number, cut_names(record.stats.cut).c_str());
+    if (record.stats.cut) std::fprintf(stderr, "rill-player: frame %d: cut %s\n", moment.frame, cut_names(record.stats.cut).c_str());
     records.push_back(record);
     return exit_ok;
 }
@@ -149,17 +177,17 @@ int Headless::draw_source(int frame, Picture& out) {
     return exit_ok;
 }
 
-int Headless::draw(int frame, Picture& out) {
+int Headless::draw(const Moment& moment, Picture& out) {
     // With a source and no wish to see both, the asset lends its bounds to the camera.
     const bool decoded = options.source.empty() || options.side_by_side;
     if (decoded) {
-        if (const int code = decode(frame)) return code;
+        if (const int code = decode(moment)) return code;
         renderer->draw(camera, options.look, options.width, options.height);
         out = renderer->read_picture();
         if (!options.side_by_side) return exit_ok;
     }
     Picture source;
-    if (const int code = draw_source(frame, source)) return code;
+    if (const int code = draw_source(moment.frame, source)) return code;
     if (!decoded) {
         out = std::move(source);
         return exit_ok;
@@ -195,12 +223,12 @@ int Headless::run() {
                                     &Headless::start_renderer})
         if (const int code = (this->*step)()) return code;
     std::printf("rill-player: %s\n", renderer->description().c_str());
-    const int count = static_cast<int>(frames.size());
+    const int count = static_cast<int>(moments.size());
     Sheet sheet(count, options.width * (options.side_by_side ? 2 : 1), options.height);
     for (int i = 0; i < count; ++i) {
         Picture picture;
-        if (const int code = draw(frames[i], picture)) return code;
-        const std::string path = fill_pattern(options.out, frames[i]);
+        if (const int code = draw(moments[i], picture)) return code;
+        const std::string path = fill_pattern(options.out, number_of(size_t(i)));
         if (!path.empty() && !write_png(path, picture)) return complain(exit_usage, path, std::strerror(errno));
         if (!options.contact_sheet.empty()) sheet.add(i, count, picture);
     }

@@ -81,7 +81,7 @@ static rill::Status play(rill::Player* player, double length) {
         // `clipped` is whole and drawable, but something was left out: cut names it, *_wanted says how much is needed.
         if (stats.cut & (rill::cut_vertices | rill::cut_indices | rill::cut_ranges))
             buffers.resize(stats.vertices_wanted + stats.vertices_wanted / 4, stats.indices_wanted + stats.indices_wanted / 4,
-                           target.range_capacity + stats.blocks_drawn);
+                           stats.ranges_wanted + stats.ranges_wanted / 4);
         std::this_thread::sleep_for(std::chrono::milliseconds(16));
     }
 }

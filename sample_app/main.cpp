@@ -67,6 +67,8 @@ static void declare(CLI::App& app, Options& o) {
     app.add_option("--frames", "the source's frame numbers, B included (default: all)")
         ->check(parsed([&o](const std::string& text) { return parse_frames(text, o.frames); }))
         ->option_text("A:B[:STEP]");
+    app.add_option("--substeps", o.substeps, "so many pictures a frame, evenly spaced: slow motion; numbered from 0")
+        ->check(CLI::Range(1, 1000))->option_text("N");
     app.add_option("--size", "picture size (default 1280x720)")
         ->check(parsed([&o](const std::string& text) { return parse_size(text, o); }))
         ->option_text("WxH");
@@ -118,6 +120,7 @@ static std::string contradiction(const Options& o) {
     if (o.side_by_side && (o.asset.empty() || o.source.empty())) return "--side-by-side needs an ASSET and --source";
     for (const std::string* pattern : {&o.out, &o.source})
         if (!pattern_is_good(*pattern)) return *pattern + ": one %d or %04d is all a pattern may hold";
+    if (o.substeps > 1 && (o.asset.empty() || !o.headless)) return "--substeps needs an ASSET and --headless";
     if (o.headless && !o.out.empty() && !pattern_has_number(o.out) && (!o.frames.given || o.frames.first != o.frames.last))
         return "--out needs a %04d: there is more than one frame";
     return "";

@@ -28,6 +28,7 @@ struct Options {
     std::string asset, out, stats, contact_sheet, source, environment;
     bool headless = false, side_by_side = false;
     FrameRange frames;
+    int substeps = 1;           ///< pictures from a frame to the next one drawn; numbered from 0 when more than one
     int width = 1280, height = 720;
     unsigned jobs = 0;          ///< 0 = one per core
     Look look;

@@ -77,9 +77,8 @@ void Overlay::build_playback(Controls& controls, const Report& report) {
     ImGui::SameLine();
     ImGui::Checkbox("Loop", &clock.loop);
     ImGui::SameLine();
-    const rill::AssetInfo& info = report.clip.info();
-    ImGui::Text("frame %.2f of %d-%d", info.first_frame + clock.seconds * info.frames_per_second, info.first_frame,
-                info.first_frame + static_cast<int>(info.frames) - 1);
+    const std::vector<int>& numbers = report.clip.frame_numbers();
+    ImGui::Text("frame %d of %d-%d", numbers[report.clip.nearest_frame(clock.seconds)], numbers.front(), numbers.back());
     const double start = 0.0;
     ImGui::SliderScalar("seconds", ImGuiDataType_Double, &clock.seconds, &start, &clock.length, "%.3f");
     ImGui::SliderFloat("speed", &clock.speed, -4.0f, 4.0f, "%.2f x");

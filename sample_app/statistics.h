@@ -20,6 +20,7 @@ void for_each_stat(const rill::Stats& s, Visit&& visit) {
     visit("points_used", s.points_used);
     visit("vertices_wanted", s.vertices_wanted);
     visit("indices_wanted", s.indices_wanted);
+    visit("ranges_wanted", s.ranges_wanted);
     visit("chunks_resident", s.chunks_resident);
     visit("chunks_late", s.chunks_late);
     visit("reads_in_flight", s.reads_in_flight);

@@ -111,9 +111,11 @@ int Window::start() {
     controls.force_cell = options.detail.cell > 0.0f;
     controls.clock.length = info.seconds;
     controls.clock.speed = options.speed;
-    if (options.frames.given)
-        controls.clock.seconds = std::clamp((options.frames.first - info.first_frame) / std::max(info.frames_per_second, 1e-6),
-                                            0.0, info.seconds);
+    if (options.frames.given) {
+        const std::vector<int>& numbers = clip.frame_numbers();
+        const auto at = std::lower_bound(numbers.begin(), numbers.end() - 1, options.frames.first);
+        controls.clock.seconds = clip.frame_seconds(static_cast<uint32_t>(at - numbers.begin()));
+    }
     allocations_at_create = clip.heap().allocations();
     glfwSetWindowUserPointer(screen.window, this);
     glfwSetScrollCallback(screen.window, [](GLFWwindow* w, double, double y) { self(w).wheel(y); });
@@ -191,8 +193,7 @@ void Window::decode(int width, int height) {
 
 /// The source's frame nearest in time, read when it changes.
 void Window::show_source() {
-    const rill::AssetInfo& info = clip.info();
-    const int frame = info.first_frame + static_cast<int>(std::lround(controls.clock.seconds * info.frames_per_second));
+    const int frame = clip.frame_numbers()[clip.nearest_frame(controls.clock.seconds)];
     if (frame != source_frame) {
         std::string cause;
         const std::string path = fill_pattern(options.source, frame);

@@ -87,7 +87,8 @@ TEST_CASE("points are handed out, and a drop is drawn beside them") {
     playing.target.point_position = {points.data(), sizeof(glm::vec3)};
     playing.target.point_normal = {normals.data(), sizeof(glm::vec3)};
     playing.target.point_capacity = 500;
-    CHECK(playing.draw(0.25) == Status::ok);
+    CHECK(playing.draw(0.25) == Status::clipped);
+    CHECK(playing.stats.cut == rill::cut_points);
     CHECK(playing.stats.points_used == 601);
     CHECK(playing.target.points_used == 500);
     for (uint32_t i = 0; i < 500; ++i) {
@@ -98,8 +99,13 @@ TEST_CASE("points are handed out, and a drop is drawn beside them") {
     CHECK(rill::cooker::topology(mesh_of(playing)).components == 2);
     std::vector<uint8_t> packed(1 + 13 * 500);  // of any stride, anywhere
     playing.target.point_position = {packed.data() + 1, 13};
-    CHECK(playing.draw(0.25) == Status::ok);
+    playing.target.point_normal = {};
+    CHECK(playing.draw(0.25) == Status::clipped);
     for (uint32_t i = 0; i < 500; ++i) CHECK(std::memcmp(packed.data() + 1 + 13 * i, &points[i], sizeof points[i]) == 0);
+    playing.target.point_position = {points.data(), sizeof(glm::vec3)};
+    playing.target.point_capacity = 600;
+    CHECK(playing.draw(0.25) == Status::ok);
+    CHECK(playing.target.points_used == 600);
 }
 
 TEST_CASE("a time on a window's border belongs to the later window, the clip's end to the last") {
@@ -222,6 +228,7 @@ TEST_CASE("every capacity from nothing up: whole pieces, nothing beyond, and the
         CHECK(((playing.stats.cut & rill::cut_ranges) != 0) == (r < ranges));
         CHECK(playing.stats.vertices_wanted == vertices);
         CHECK(playing.stats.indices_wanted == indices);
+        CHECK(playing.stats.ranges_wanted == ranges);
         uint32_t in_ranges = 0;
         for (uint32_t k = 0; k < t.ranges_used; ++k) in_ranges += playing.ranges[k].index_count;
         if (i) CHECK(in_ranges == t.indices_used);

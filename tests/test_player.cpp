@@ -141,6 +141,44 @@ TEST_CASE("headless playback writes pictures, a sheet and statistics") {
     CHECK(stats["summary"]["allocations_after_create"] == 0);
 }
 
+TEST_CASE("slow motion: pictures between frames") {
+    const Outcome outcome = play("ball.rill --headless --frames 16:18 --substeps 4 --size 320x180 --out s%02d.png --stats slow.json");
+    CHECK(outcome.code == 0);
+    for (int picture = 0; picture <= 8; ++picture) CHECK(fs::exists(bench().path(("s0" + std::to_string(picture) + ".png").c_str())));
+    CHECK_FALSE(fs::exists(bench().path("s09.png")));
+    const nlohmann::json frames = nlohmann::json::parse(read_file(bench().path("slow.json")))["frames"];
+    REQUIRE(frames.size() == 9);
+    CHECK(frames[3]["frame"] == 16);
+    CHECK(frames[3]["seconds"].get<double>() == doctest::Approx(1.75 / 24));
+    CHECK(frames[4]["frame"] == 17);
+    REQUIRE(play("ball.rill --headless --frames 17:17 --size 320x180 --out s17.png").code == 0);
+    CHECK(difference(Image(bench().path("s04.png")), Image(bench().path("s17.png"))) == 0);
+    CHECK(difference(Image(bench().path("s04.png")), Image(bench().path("s05.png"))) > 0);
+}
+
+TEST_CASE("frame numbers are the source's where they step by two, and where some are missing") {
+    for (const bool gap : {false, true}) {
+        CAPTURE(gap);
+        const fs::path frames = bench().folder / "numbers";
+        fs::remove_all(frames);
+        fs::create_directories(frames);
+        for (int frame = 15; frame <= 20; ++frame)
+            if (!gap || frame != 17) write_frame(frames / ("ball_00" + std::to_string(frame) + ".ply"), frame);
+        rill::cooker::CookSettings settings;
+        settings.error = "1e";
+        settings.read.first = 15, settings.read.last = 20, settings.read.step = gap ? 1 : 2;
+        rill::cooker::cook(frames.string(), bench().path("numbers.rill"), settings, [](const rill::cooker::CookProgress&) {});
+        REQUIRE(play("numbers.rill --headless --frames 19:19 --size 320x180 --out n19.png --stats n.json").code == 0);
+        const nlohmann::json stats = nlohmann::json::parse(read_file(bench().path("n.json")));
+        CHECK(stats["frames"][0]["seconds"].get<double>() == doctest::Approx(4.0 / 24));
+        CHECK(play("numbers.rill --headless --side-by-side --source numbers/ball_00%d.ply --size 160x90 --out both%d.png").code == 0);
+        CHECK(fs::exists(bench().path("both19.png")));
+        const Outcome none = play(gap ? "numbers.rill --headless --frames 17:17" : "numbers.rill --headless --frames 16:16");
+        CHECK(none.code == 1);
+        CHECK(mentions(none, gap ? "15:20" : "15:19:2"));
+    }
+}
+
 TEST_CASE("the same frame gives the same picture at any number of jobs, and in OpenGL ES") {
     for (const char* more : {"--jobs 1 --out one.png", "--jobs 4 --out four.png", "--api es --out es.png"})
         REQUIRE(play(std::string("ball.rill --headless --frames 17 --size 320x180 ") + more).code == 0);
@@ -215,7 +253,7 @@ TEST_CASE("bad usage exits 1 and says what was wanted") {
     for (const char* arguments : {"", "--headless", "ball.rill --bogus", "ball.rill --headless --frames 9:3",
                                   "ball.rill --headless --frames 16:x", "ball.rill --headless --frames 1:5",
                                   "ball.rill --size 0x100", "ball.rill --out a%s.png", "ball.rill --headless --out a.png",
-                                  "ball.rill --shading glitter", "ball.rill --eye 1,2", "ball.rill --side-by-side"}) {
+                                  "ball.rill --substeps 4", "ball.rill --shading glitter", "ball.rill --eye 1,2", "ball.rill --side-by-side"}) {
         CAPTURE(arguments);
         const Outcome outcome = play(arguments);
         CHECK(outcome.code == 1);

@@ -113,7 +113,7 @@ struct AssetPlayer::Impl {
             limits.vertices = grown(limits.vertices, stats.vertices_wanted);
             limits.indices = grown(limits.indices, stats.indices_wanted);
         }
-        if (stats.cut & cut_ranges) size_buffers(0, 0, grown(ranges.size(), 0));
+        if (stats.cut & cut_ranges) size_buffers(0, 0, grown(ranges.size(), stats.ranges_wanted));
         if (stats.cut & cut_points) limits.points = grown(limits.points, stats.points_wanted);
         if (stats.cut & cut_residency) limits.resident_bytes *= 2;
         restart();

@@ -135,6 +135,7 @@ void describe(Directory& d) {
     info.windows = h.window_count;
     info.layers = h.layer_count;
     info.first_frame = h.first_frame;
+    info.frame_step = h.frame_step;
     info.content_hash = h.content_hash;
     info.settings_json = reinterpret_cast<const char*>(d.tables.settings);
     sum_up_windows(d);

@@ -54,9 +54,11 @@ void count_output(Player& player, Stats& stats) {
     stats.points_used = player.field.point_count + player.field.drop_count;
     stats.vertices_wanted = mesh.vertices_wanted;
     stats.indices_wanted = mesh.indices_wanted;
+    stats.ranges_wanted = mesh.ranges_wanted;
     stats.cut |= mesh.cut | (e.cut ? uint32_t(cut_points) : 0u);
     const bool points = target->point_position.data || target->point_normal.data;
     target->points_used = points ? std::min(e.points.count, target->point_capacity) : 0;
+    if (points && target->points_used < e.points.count) stats.cut |= cut_points;
 }
 
 void count_time(Player& player, Stats& stats) {

@@ -52,8 +52,8 @@ struct ThreadPool {
     bool stopping = false, helped = false;  ///< helped: there is a worker 0 just now
 
     /// Takes one task out under the lock and runs it outside. False: there is none.
-    bool run_one(std::unique_lock<std::mutex>& lock, uint32_t worker) {
-        std::deque<Batch>& queue = needed.empty() ? prefetch : needed;
+    bool run_one(std::unique_lock<std::mutex>& lock, uint32_t worker, bool also_prefetch) {
+        std::deque<Batch>& queue = needed.empty() && also_prefetch ? prefetch : needed;
         if (queue.empty()) return false;
         Batch& batch = queue.front();
         const Batch mine = batch;
@@ -67,7 +67,7 @@ struct ThreadPool {
     void work(uint32_t worker) {
         std::unique_lock<std::mutex> lock(mutex);
         for (;;) {
-            if (run_one(lock, worker)) continue;
+            if (run_one(lock, worker, true)) continue;
             if (stopping) return;
             lock.unlock();
             look_out();
@@ -130,7 +130,7 @@ Jobs thread_jobs(ThreadPool* pool) noexcept {
         std::unique_lock<std::mutex> lock(pool.mutex);
         // Threads that drive different players may wait at the same time, and there is one worker 0.
         bool helped = false;
-        if (!pool.helped) pool.helped = true, helped = pool.run_one(lock, 0), pool.helped = false;
+        if (!pool.helped) pool.helped = true, helped = pool.run_one(lock, 0, false), pool.helped = false;
         lock.unlock();
         if (!helped) std::this_thread::yield();
     };

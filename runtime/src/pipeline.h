@@ -164,8 +164,9 @@ void* heap_take(Heap& heap, uint64_t bytes) noexcept;                ///< 64-byt
 void heap_trim(Heap& heap, void* block, uint64_t bytes) noexcept;    ///< gives the tail back
 void heap_give(Heap& heap, void* block) noexcept;
 
-/// undecodable: found out in this frame; rejected: its memory given back, never asked for again.
-enum class ChunkState : uint8_t { absent, reading, arrived, resident, undecodable, rejected };
+/// unpacking: a job that no frame waits for decodes it; undecodable: found out in this frame; rejected: its memory given
+/// back, never asked for again.
+enum class ChunkState : uint8_t { absent, reading, arrived, unpacking, resident, undecodable, rejected };
 struct ChunkSlot {
     ChunkState state;
     uint8_t failures;              ///< reads that failed in a row
@@ -177,6 +178,25 @@ struct ChunkSlot {
     format::TrackBlock* block;     ///< head, tracks, coefficients, bytes as read: one piece of the heap
     const char* fault;             ///< why it is undecodable
 };
+/// A job that decodes prefetch between frames, on workers that have nothing else to do. Whoever wins the phase decodes: a frame
+/// that wants the chunk before the job has begun takes it over, and one that comes while it runs waits for it like for a task
+/// of its own.
+struct Unpacking {
+    enum Phase : uint32_t {
+        idle,
+        queued,   ///< with the engine
+        running,
+        awaited,  ///< running, and the frame's relay expects it
+        done,     ///< `result` stands; the job touches nothing any more
+        taken,    ///< by a frame; the engine still has the job, which will only say idle
+    };
+    std::atomic<uint32_t> phase{idle};
+    Player* player = nullptr;
+    uint32_t chunk = 0;
+    ChunkState result = ChunkState::absent;
+};
+inline constexpr uint32_t most_unpacking = 8;
+
 struct Residency {
     Asset* asset;
     uint32_t player_index;         ///< in tickets
@@ -189,7 +209,11 @@ struct Residency {
     uint32_t slot_count, slots_out;
     uint32_t* to_decode;           ///< arrived chunks that this frame decodes
     uint32_t decode_count;
-    uint64_t decode_bytes;         ///< of those
+    uint64_t decode_bytes;         ///< of those, and of `joins`
+    Unpacking unpacking[most_unpacking];
+    uint32_t joins[most_unpacking];  ///< of `unpacking`: what this frame wants of them
+    uint32_t join_count;
+    double last_seconds;           ///< in the clip: the frame before
     uint64_t frame_number;
     uint64_t frame_bytes_asked;
     bool waiting;                  ///< Frame::wait_for_data: failed reads are repeated at once
@@ -211,13 +235,21 @@ bool collect_reads(Residency& residency, const Directory& directory) noexcept;
 /// Nothing of this moment can still arrive by waiting.
 bool is_settled(const Residency& residency, const Plan& plan) noexcept;
 void forget_reads(Residency& residency) noexcept;
-/// Chooses what this frame decodes: of this moment what `most_bytes` allows, one chunk at least, and some of the
-/// prefetch.
-void choose_decodes(Residency& residency, const Directory& directory, const Plan& plan, uint64_t most_bytes) noexcept;
-/// One task per chunk; context Player.
-extern const Stage decode_stage;
-/// After the frame: staging back to the heap, faults counted and logged.
+/// Chooses what this frame decodes: of this moment what `most_bytes` allows, one chunk at least, and `prefetch` chunks of
+/// what comes later.
+void choose_decodes(Residency& residency, const Directory& directory, const Plan& plan, uint64_t most_bytes,
+                    uint32_t prefetch) noexcept;
+/// Prefetched chunks to decode this frame, so that those that are here are ready in time without one frame bearing many.
+uint32_t prefetch_due(const Residency& residency, const Plan& plan) noexcept;
+/// One task per chunk, then what jobs between frames have done of this moment; context Player.
+inline constexpr uint32_t decode_stage_count = 2;
+extern const Stage decode_stages[decode_stage_count];
+/// After the frame: staging back to the heap, faults counted and logged. Before it, too: of jobs between frames.
 void settle_decodes(Residency& residency, const Directory& directory) noexcept;
+/// Hands `count` prefetched chunks to the engine, as jobs that no frame waits for.
+void start_unpacking(Player& player, uint32_t count) noexcept;
+/// False: some jobs are still with the engine. Those that have not begun will do nothing.
+bool stop_unpacking(Residency& residency) noexcept;
 void release_chunk(Residency& residency, uint32_t chunk) noexcept;
 
 // ---- chunks → points ------------------------------------------------------------------------------

@@ -205,12 +205,19 @@ void pump_reads(Player& player) {
     }
 }
 
+/// Then prefetch is decoded between frames, else by them.
+bool has_workers_to_spare(const Player& player) {
+    const Jobs& jobs = player.asset->host.jobs;
+    return jobs.submit && jobs.workers > 1;
+}
+
 void chain_stages(Player& player) {
     Relay& relay = player.relay;
-    choose_decodes(player.residency, *player.directory, player.plan, decode_bytes_affordable(player));
+    const uint32_t prefetch = has_workers_to_spare(player) ? 0 : prefetch_due(player.residency, player.plan);
+    choose_decodes(player.residency, *player.directory, player.plan, decode_bytes_affordable(player), prefetch);
     relay.clear(player.asset->host.jobs);
     relay.add(&mark_stage, 1, &player.decode_begun);
-    relay.add(&decode_stage, 1, &player);
+    relay.add(decode_stages, decode_stage_count, &player);
     relay.add(&mark_stage, 1, &player.decode_done);
     if (player.frame.target) {
         relay.add(&evaluate_stage, 1, &player);
@@ -366,6 +373,11 @@ Status create(Asset* asset, const Limits& asked, Player** out) noexcept {
 
 Status destroy(Player* player) noexcept {
     if (!player || player->frame_open) return Status::bad_argument;
+    if (!stop_unpacking(player->residency)) {
+        const Jobs& jobs = player->asset->host.jobs;
+        jobs.help(jobs.user);
+        return Status::pending;
+    }
     collect_reads(player->residency, *player->directory);
     if (player->residency.slots_out) {
         forget_reads(player->residency);
@@ -398,6 +410,7 @@ Status begin_frame(Player* player, const Frame& frame) noexcept {
     ++r.frame_number;
     r.frame_bytes_asked = 0;
     r.waiting = frame.wait_for_data;
+    settle_decodes(r, *p.directory);
     drop_ranks(r, p.plan);
     plan_frame(*p.directory, frame, p.plan);
     give_up_detail(p);
@@ -420,6 +433,8 @@ Status end_frame(Player* player, Stats* out) noexcept {
     p.wait_us = uint32_t(microseconds_now(p) - begun);
     settle_decodes(p.residency, *p.directory);
     const Stats stats = count_all(p);
+    if (has_workers_to_spare(p)) start_unpacking(p, prefetch_due(p.residency, p.plan));
+    p.residency.last_seconds = p.plan.moment.seconds;
     p.frame_open = false;
     if (out) *out = stats;
     return stats.cut ? Status::clipped : Status::ok;

@@ -33,18 +33,18 @@ void Relay::start() noexcept {
 void Relay::advance(uint32_t worker) noexcept {
     while (current_ < step_count_) {
         const Step step = steps_[current_];
+        tasks_left_.store(1, std::memory_order_relaxed);  // this thread's own: nobody goes on before it lets go
         const uint32_t tasks = step.stage.prepare(step.context);
         if (tasks == 0 || !step.stage.repeats) ++current_;
-        if (tasks == 0 || !step.stage.run) continue;
-        if (tasks == 1) {  // not worth a trip through the engine's queue
+        if (tasks == 1 && step.stage.run) {  // not worth a trip through the engine's queue
             step.stage.run(step.context, 0, worker);
-            continue;
+        } else if (tasks > 1 && step.stage.run) {
+            running_ = step;  // run_task() finds its stage here, also after current_ has moved on
+            tasks_left_.fetch_add(tasks, std::memory_order_relaxed);
+            jobs_.submit(jobs_.user, &Relay::run_task, this, tasks, true);
         }
-        // run_task() finds its stage here, also after current_ has moved on.
-        running_ = step;
-        tasks_left_.store(tasks, std::memory_order_relaxed);
-        jobs_.submit(jobs_.user, &Relay::run_task, this, tasks, true);
-        return;  // the baton is with the last task now: touch nothing
+        // With work still out, the baton is with whoever ends the last of it: touch nothing.
+        if (tasks_left_.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
     }
     done_.store(true, std::memory_order_release);
 }
@@ -52,7 +52,11 @@ void Relay::advance(uint32_t worker) noexcept {
 void Relay::run_task(void* context, uint32_t index, uint32_t worker) {
     auto* relay = static_cast<Relay*>(context);
     relay->running_.stage.run(relay->running_.context, index, worker);
-    if (relay->tasks_left_.fetch_sub(1, std::memory_order_acq_rel) == 1) relay->advance(worker);
+    relay->finish_one(worker);
+}
+
+void Relay::finish_one(uint32_t worker) noexcept {
+    if (tasks_left_.fetch_sub(1, std::memory_order_acq_rel) == 1) advance(worker);
 }
 
 }  // namespace rill

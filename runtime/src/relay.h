@@ -40,6 +40,11 @@ struct Relay {
     void start() noexcept;
     /// Everything here and now.
     void run_all() noexcept;
+    /// From within prepare(): the stage is not over before finish_one() was called once more, or expect() taken back.
+    void expect() noexcept { tasks_left_.fetch_add(1, std::memory_order_relaxed); }
+    void expect_no_more() noexcept { tasks_left_.fetch_sub(1, std::memory_order_relaxed); }
+    /// Work of a stage is done; what it wrote is visible to the next one. The last to say so goes on with that.
+    void finish_one(uint32_t worker) noexcept;
     /// Everything the stages wrote is visible once this is true, and no task touches the relay any more.
     bool done() const noexcept { return done_.load(std::memory_order_acquire); }
 

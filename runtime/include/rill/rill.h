@@ -46,9 +46,10 @@ struct Jobs {
     void* user;
     uint32_t workers;
     /// Runs task(context, 0 … count-1, worker) some time, in any order. Must not wait.
-    /// needed_this_frame is false for prefetch work that may yield to the engine's own.
+    /// needed_this_frame is false for prefetch: submitted in end_frame() when there are several workers, it may yield to the
+    /// engine's own work and take any time, but must run before destroy() can end. A frame that needs it earlier does it itself.
     void (*submit)(void* user, Task task, void* context, uint32_t count, bool needed_this_frame);
-    /// Called in a loop while end_frame() waits: run one job, or yield. By several threads at once when several drive Players:
+    /// Called in a loop while end_frame() waits, and by destroy(): run one job (rather one that is needed this frame), or yield. By several threads at once when several drive Players:
     /// each needs a worker number of its own, or only one of them at a time runs a job.
     void (*help)(void* user);
 };
@@ -98,6 +99,8 @@ struct AssetInfo {
     uint32_t format;             ///< version of the file format
     uint32_t frames, windows, layers, blocks;  ///< blocks: most blocks in any window
     int32_t first_frame;         ///< the source's number of the first frame
+    int32_t frame_step;          ///< to that of the next; where some are missing the least such step, and all
+                                 ///< numbers are "frame_numbers" in settings_json
     uint32_t most_points;        ///< most points alive in any one window: sizes Limits::points
     uint64_t largest_window_bytes;  ///< most resident bytes any one window needs, all layers
     uint64_t content_hash;       ///< of the payload bytes: names this exact cook
@@ -127,7 +130,7 @@ Limits suggest_limits(const Asset* asset) noexcept;
 /// Exactly what create() will allocate, in bytes.
 uint64_t footprint(const Asset* asset, const Limits& limits) noexcept;
 Status create(Asset* asset, const Limits& limits, Player** out) noexcept;
-/// pending while its reads are out: they still point at its memory; bad_argument between begin_frame() and end_frame().
+/// pending while its reads or jobs are out: they still point at its memory; bad_argument between begin_frame() and end_frame().
 Status destroy(Player* player) noexcept;
 
 /// World space. Planes (n, d): n·x + d ≥ 0 inside; n of unit length.
@@ -184,7 +187,7 @@ struct Frame {              ///< views and target must stay valid until end_fram
 };
 /// What was held back this frame, and so what to raise.
 enum Cut : uint32_t {
-    cut_points = 1,
+    cut_points = 1,     ///< by Limits, Budget or Target::point_capacity
     cut_vertices = 2,
     cut_indices = 4,
     cut_ranges = 8,
@@ -196,7 +199,7 @@ enum Cut : uint32_t {
 struct Stats {
     uint32_t cut;  ///< Cut bits
     uint32_t blocks_in_view, blocks_drawn, layers_wanted, layers_drawn;
-    uint32_t points_wanted, points_used, vertices_wanted, indices_wanted;
+    uint32_t points_wanted, points_used, vertices_wanted, indices_wanted, ranges_wanted;
     uint32_t chunks_resident, chunks_late;  ///< now; late: wanted for this moment and not there
     uint32_t reads_in_flight;
     uint32_t chunks_rejected, reads_refused, reads_failed;  ///< since create()
