@@ -285,6 +285,8 @@ TEST_CASE("cook: warnings tell what is wrong and what to do about it") {
     check("sound", three, [](Mesh&) {}, {});
     check("open", three, [](Mesh& m) { m.triangles.resize(m.triangles.size() - 5); }, {"warning", "f3.ply: the mesh is open (", "export the whole liquid"});
     check("inside_out", three, [](Mesh& m) { for (Triangle& t : m.triangles) std::swap(t[1], t[2]); }, {"f3.ply: triangles face inward"});
+    check("uneven", three, [](Mesh& m) { for (size_t i = 0; i < m.triangles.size(); i += 9) std::swap(m.triangles[i][1], m.triangles[i][2]); },
+          {"f3.ply (", "otherwise than their neighbours are turned"});
     check("gap", {3, 4, 6}, [](Mesh&) {}, {"frame 5 is missing", "bake what is missing"});
     check("bare", three, [](Mesh& m) { m.velocities.clear(); }, {"f3.ply: no velocity; it is estimated"});
     check("fast", {3, 6, 9}, [](Mesh& m) { for (glm::vec3& v : m.velocities) v *= 24.0f; }, {"multiplied by 0.04167", "by the frame rate"});

@@ -9,6 +9,7 @@
 #include "asset/asset_player.h"
 #include "cook/cook.h"
 #include "frames/split_edges.h"
+#include "frames/turn_alike.h"
 #include "frames/weld_seams.h"
 #include "measure/surface_distance.h"
 #include "sequence_files.h"
@@ -160,6 +161,46 @@ TEST_CASE("what touches at a vertex stays apart, and a hole stays one") {
     two.triangles.erase(two.triangles.begin() + ptrdiff_t(two.triangles.size() / 4));  // open edges that no weld closes
     CHECK(weld_seams(two) == 0);
     CHECK(two.positions == before.positions);
+}
+
+TEST_CASE("triangles that face otherwise than their neighbours are turned, of each part the lesser area") {
+    Mesh sound = sphere(24, 1), other = sphere(16, 0.5f, {3, 0, 0});
+    append(sound, other);
+    const auto is_put_right = [](const Mesh& whole, const std::vector<size_t>& turned) {
+        Mesh mesh = whole;
+        for (const size_t i : turned) std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
+        CHECK(turn_alike(mesh) == turned.size());
+        return mesh.triangles == whole.triangles;
+    };
+    std::vector<size_t> some;
+    for (size_t i = 0; i < sound.triangles.size(); ++i)
+        if (i * 7919 % 100 < 10) some.push_back(i);
+    REQUIRE(some.size() > 50);
+    CHECK(is_put_right(sound, {}));
+    CHECK(is_put_right(sound, some));
+    Mesh open = sound;  // a hole is no reason
+    open.triangles.erase(open.triangles.begin() + 100, open.triangles.begin() + 130);
+    CHECK(is_put_right(open, {}));
+    CHECK(is_put_right(open, {3, 4, 500}));
+
+    Mesh inward = sound;  // wholly, and alike: not this stage's business
+    for (Triangle& t : inward.triangles) std::swap(t[1], t[2]);
+    CHECK(turn_alike(inward) == 0);
+    CHECK(signed_volume(inward) == doctest::Approx(-signed_volume(sound)));
+
+    Mesh strip;  // one-sided: nothing helps
+    for (int i = 0; i < 12; ++i)
+        for (const float side : {-1.f, 1.f}) {
+            const float a = float(i) / 12 * 6.2831853f, r = 3 + side * std::cos(a / 2);
+            strip.positions.push_back({r * std::cos(a), r * std::sin(a), side * std::sin(a / 2)});
+        }
+    for (uint32_t i = 0; i < 12; ++i) {
+        const uint32_t a = 2 * i, b = a + 1, c = i < 11 ? a + 2 : 1, d = i < 11 ? a + 3 : 0;
+        strip.triangles.push_back({a, b, c}), strip.triangles.push_back({c, b, d});
+    }
+    const std::vector<Triangle> before = strip.triangles;
+    CHECK(turn_alike(strip) == 0);
+    CHECK(strip.triangles == before);
 }
 
 TEST_CASE("liquid with a floor of two triangles comes out whole") {

@@ -6,6 +6,7 @@
 #include "asset/asset_directory.h"
 #include "commands/bench_beside.h"
 #include "commands/bench_detail.h"
+#include "commands/bench_steady.h"
 #include "commands/commands.h"
 
 namespace rill::cooker {
@@ -136,6 +137,7 @@ struct Report {
     BesideCells larger_cells;
     std::vector<SideBySide> scaling;  ///< by workers, from 1
     double two_at_once = 0;
+    std::vector<SteadyPlay> steady;   ///< by workers, from 1
     std::vector<ScreenError> far;
     CameraJumps camera;
 
@@ -151,7 +153,7 @@ struct Report {
 };
 
 /// With one worker, who does everything.
-void measure_single(Report& report, BenchPlayer& player, const std::vector<uint32_t>& frames) {
+void measure_single(Report& report, BenchPlayer& player, const std::string& asset, const std::vector<uint32_t>& frames) {
     const std::vector<size_t> ahead = forward(frames.size()), back(ahead.rbegin(), ahead.rend());
     report.allocations_until_created = player.allocations();
     report.passes.push_back(run_pass(player, "cold", 1, frames, ahead, 1));
@@ -169,6 +171,7 @@ void measure_single(Report& report, BenchPlayer& player, const std::vector<uint3
     report.details.push_back(run_pass(player, "an eighth", 1, frames, ahead, 1));
     player.look(0, false);
     report.peak_bytes = player.peak_bytes();
+    report.steady.push_back(steady_play(asset, 1, frames));
     report.draco = beside_draco(player, frames);
     report.larger_cells = beside_larger_cells(player, frames);
     report.far = screen_errors(player, frames);
@@ -182,11 +185,12 @@ void measure_several(Report& report, BenchPlayer& single, const std::string& ass
     report.passes.push_back(run_pass(player, "cold", jobs, frames, ahead, 1));
     report.passes.push_back(run_pass(player, "forward", jobs, frames, ahead, 1));
     report.scaling.push_back(beside_one_worker(single, player, frames));
+    report.steady.push_back(steady_play(asset, jobs, frames));
     if (jobs == 2) report.two_at_once = two_at_once(single, asset, frames);
 }
 
 nlohmann::json to_json(const Report& report, const AssetDirectory& directory, const std::string& asset, size_t frames) {
-    nlohmann::json passes = nlohmann::json::array(), scaling = nlohmann::json::array(), screen = nlohmann::json::array(), cells = nlohmann::json::array();
+    nlohmann::json passes = nlohmann::json::array(), scaling = nlohmann::json::array(), steady = nlohmann::json::array(), screen = nlohmann::json::array(), cells = nlohmann::json::array();
     for (size_t k = 0; k < BesideCells::sizes; ++k)
         cells.push_back({{"times_as_large", 1 << k}, {"mean_us", report.larger_cells.times[k]}, {"share", report.larger_cells.share(k)}});
     for (const auto* list : {&report.passes, &report.details})
@@ -194,6 +198,15 @@ nlohmann::json to_json(const Report& report, const AssetDirectory& directory, co
     for (size_t i = 0; i < report.scaling.size(); ++i)
         scaling.push_back({{"jobs", i + 1}, {"mean_us", report.scaling[i].other}, {"speedup", report.scaling[i].ratio()}});
     if (report.two_at_once > 0) scaling[1]["two_players_at_once"] = report.two_at_once;
+    for (size_t i = 0; i < report.steady.size(); ++i) {
+        const SteadyPlay& s = report.steady[i];
+        steady.push_back({{"jobs", i + 1},
+                          {"pictures", s.pictures},
+                          {"p50_us", s.median_us},
+                          {"max_us", s.worst_us},
+                          {"max_decode_us", s.worst_decode_us},
+                          {"max_decode_share", s.worst_share}});
+    }
     for (const ScreenError& e : report.far)
         screen.push_back({{"diagonals", e.diagonals},
                           {"triangles_share", e.triangles},
@@ -214,6 +227,7 @@ nlohmann::json to_json(const Report& report, const AssetDirectory& directory, co
             {"output_identical", report.same()},
             {"passes", passes},
             {"scaling", scaling},
+            {"at_60_a_second", steady},
             {"larger_cells", cells},
             {"screen_error", {{"cell_pixels", pixel_error_asked}, {"pixels_per_radian", pixels_per_radian}, {"from", screen}}},
             {"camera_jumps",
@@ -255,6 +269,11 @@ void print(const Report& report) {
     for (size_t i = 1; i < report.scaling.size(); ++i)
         std::printf("%zu workers beside one, frame by frame: %.1f ms for %.1f, %.2f times as fast\n", i + 1, report.scaling[i].other / 1000,
                     report.scaling[i].one / 1000, report.scaling[i].ratio());
+    for (size_t i = 0; i < report.steady.size(); ++i) {
+        const SteadyPlay& s = report.steady[i];
+        std::printf("60 pictures a second, %zu worker%s: median %.1f ms, worst %.1f; decoding takes %.1f ms at most, and %.0f %% of a picture\n", i + 1,
+                    i ? "s" : "", s.median_us / 1000.0, s.worst_us / 1000.0, s.worst_decode_us / 1000.0, 100 * s.worst_share);
+    }
     const BesideCells& cells = report.larger_cells;
     std::printf("cells twice, four and eight times as large, frame by frame: %.1f, %.1f and %.1f %% of a frame\n", 100 * cells.share(1), 100 * cells.share(2),
                 100 * cells.share(3));
@@ -272,7 +291,7 @@ int bench_command(const BenchOptions& options) {
     const int most_jobs = options.jobs > 0 ? options.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
     Report report;
     BenchPlayer single(options.asset, 1);
-    measure_single(report, single, frames);
+    measure_single(report, single, options.asset, frames);
     for (int jobs = 2; jobs <= most_jobs; ++jobs) measure_several(report, single, options.asset, jobs, frames);
     if (!options.quiet && options.json != "-") print(report);
     if (!options.json.empty()) write_json(options.json, to_json(report, directory, options.asset, frames.size()));

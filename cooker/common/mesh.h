@@ -39,6 +39,8 @@ float median_edge(const Mesh& mesh);
 /// Signed volume, m³, positive for outward winding. Of an open mesh: with cones from its open edges to `apex`.
 double signed_volume(const Mesh& mesh);
 double signed_volume(const Mesh& mesh, const glm::vec3& apex);
+/// Whether every edge is walked as often one way as the other.
+bool is_closed(const Mesh& mesh);
 /// An edge that no other triangle has, in the direction of its own.
 struct OpenEdge {
     uint32_t from, to, triangle;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "frames/turn_alike.h"
 #include "frames/walls.h"
 #include "frames/weld_seams.h"
 
@@ -162,6 +163,8 @@ void check_frame(Mesh& mesh, const std::string& name, const std::function<void(c
     drop_degenerate(mesh);
     if (const size_t closed = weld_seams(mesh); closed > 0 && warn)
         warn(name + " (" + std::to_string(closed) + " edges): vertices at the same place are taken as one");
+    if (const size_t turned = turn_alike(mesh); turned > 0 && warn)
+        warn(name + " (" + std::to_string(turned) + " triangles): triangles that face otherwise than their neighbours are turned");
     if (faces_inward(mesh)) {
         for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
         for (glm::vec3& n : mesh.normals) n = -n;
