@@ -121,6 +121,7 @@ static std::string contradiction(const Options& o) {
     for (const std::string* pattern : {&o.out, &o.source})
         if (!pattern_is_good(*pattern)) return *pattern + ": one %d or %04d is all a pattern may hold";
     if (o.substeps > 1 && (o.asset.empty() || !o.headless)) return "--substeps needs an ASSET and --headless";
+    if (!o.asset.empty() && !std::filesystem::exists(o.asset)) return "";  // whoever opens it says so better
     if (o.headless && !o.out.empty() && !pattern_has_number(o.out) && (!o.frames.given || o.frames.first != o.frames.last))
         return "--out needs a %04d: there is more than one frame";
     return "";

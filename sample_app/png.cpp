@@ -7,15 +7,13 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "new_file.h"
+
 namespace player {
 
 bool write_png(const std::string& path, const Picture& picture) {
-    const std::string beside = path + ".part";
-    if (!stbi_write_png(beside.c_str(), picture.width, picture.height, 3, picture.rgb.data(), picture.width * 3)) {
-        std::remove(beside.c_str());
-        return false;
-    }
-    return std::rename(beside.c_str(), path.c_str()) == 0;
+    const NewFile file(path);
+    return file.finish(stbi_write_png(file.place.c_str(), picture.width, picture.height, 3, picture.rgb.data(), picture.width * 3) != 0);
 }
 
 void paste(Picture& into, const Picture& from, int x, int y) {

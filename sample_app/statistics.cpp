@@ -5,6 +5,8 @@
 #include <cinttypes>
 #include <cstdio>
 
+#include "new_file.h"
+
 namespace player {
 
 std::string cut_names(uint32_t cut) {
@@ -83,8 +85,8 @@ static void print_summary(std::FILE* file, const Clip& clip, uint64_t allocation
 
 bool write_statistics(const std::string& path, const std::string& asset, const Clip& clip,
                       uint64_t allocations_after_create, const std::vector<FrameRecord>& frames) {
-    const std::string beside = path + ".part";
-    std::FILE* file = std::fopen(beside.c_str(), "w");
+    const NewFile beside(path);
+    std::FILE* file = std::fopen(beside.place.c_str(), "w");
     if (!file) return false;
     std::fprintf(file, "{\n  \"asset\": %s,\n  \"frames\": [\n", quoted(asset).c_str());
     for (size_t i = 0; i < frames.size(); ++i) {
@@ -95,8 +97,7 @@ bool write_statistics(const std::string& path, const std::string& asset, const C
     print_summary(file, clip, allocations_after_create, frames);
     std::fputs("}\n", file);
     const bool good = !std::ferror(file);
-    return (std::fclose(file) == 0 && good && std::rename(beside.c_str(), path.c_str()) == 0) ||
-           (std::remove(beside.c_str()), false);
+    return beside.finish(std::fclose(file) == 0 && good);
 }
 
 }  // namespace player

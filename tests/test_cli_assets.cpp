@@ -150,6 +150,12 @@ TEST_CASE("export: meshes that lie on the source, with normals and velocity") {
 
     CHECK(run_rill("export " + clip().asset + " -o " + (folder / "all.ply")).code == 1);
     CHECK(run_rill("export " + clip().asset + " --cell 0.1 -o " + (folder / "all.glb")).code == 0);
+    const Result back = run_rill("cook " + (folder / "all.glb") + " -o " + (folder / "back.rill"));
+    CHECK(back.code == 2);
+    CHECK(has(back, "all.glb: is an animation of many meshes, which is not read"));
+    const Result tiny = run_rill("export " + clip().asset + " --cell 1e-6 -o " + (folder / "tiny.ply") + " --time 0");
+    CHECK(tiny.code == 1);
+    CHECK(has(tiny, "--cell 1e-06: the source's own resolution is"));
     const std::string glb = get_file(folder / "all.glb");
     uint32_t json_bytes;
     std::memcpy(&json_bytes, glb.data() + 12, 4);

@@ -183,6 +183,12 @@ TEST_CASE("triangles that face otherwise than their neighbours are turned, of ea
     CHECK(is_put_right(open, {}));
     CHECK(is_put_right(open, {3, 4, 500}));
 
+    Mesh twice = sound;  // faces that stand there twice
+    twice.triangles.push_back(twice.triangles[7]);
+    CHECK(is_put_right(twice, {}));
+    twice.triangles.resize(8), twice.triangles.push_back(twice.triangles[7]);
+    CHECK(is_put_right(twice, {}));
+
     Mesh inward = sound;  // wholly, and alike: not this stage's business
     for (Triangle& t : inward.triangles) std::swap(t[1], t[2]);
     CHECK(turn_alike(inward) == 0);

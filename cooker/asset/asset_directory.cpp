@@ -2,7 +2,10 @@
 #include "asset/asset_directory.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -65,9 +68,11 @@ void check_chunks(const AssetDirectory& directory) {
 }
 
 AssetDirectory read_directory(const std::string& path) {
+    if (std::filesystem::is_directory(path)) throw InputError(path + ": cannot be read: is a directory");
+    errno = 0;
     std::ifstream file(path, std::ios::binary | std::ios::ate);
     const std::streamoff size = file.tellg();
-    if (!file || size < 0) throw InputError(path + ": cannot be read");
+    if (!file || size < 0) throw InputError(path + ": cannot be read" + (errno ? ": " + std::string(std::strerror(errno)) : ""));
     AssetDirectory result;
     result.path = path;
     const char* reason = "it ends early";

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "common/mesh.h"
+#include "common/output_file.h"
 #include "format/check.h"
 #include "format/crc32.h"
 #include "format/lattice.h"
@@ -328,11 +329,12 @@ void AssetWriter::finish(const AssetFacts& facts) {
     write_header(head, header);
     check_own(impl.path, head.bytes, directory, header.file_bytes);
 
-    NewFile partial(impl.path + ".partial");
+    const std::string place = followed(impl.path).string();
+    NewFile partial(place + ".partial");
     partial.write(head.bytes.data(), head.bytes.size());
     partial.write(directory.data(), directory.size());
     partial.copy_from(impl.spool, impl.spooled);
-    partial.rename_to(impl.path);
+    partial.rename_to(place);
 }
 
 }  // namespace rill::cooker

@@ -43,7 +43,7 @@ FrameRange parse_frames(const std::string& text) {
 
 CLI::Option* InputOptions::add_to(CLI::App& command) {
     CLI::Option* input = command.add_option("INPUT", path, "Directory, pattern (frame_%04d.ply, 'frame_*.ply') or file")->required();
-    command.add_option("--fps", read.frames_per_second, "Frames per second, over what the source says")->check(CLI::PositiveNumber);
+    command.add_option("--fps", read.frames_per_second, "Frames per second, over what the source says")->check(CLI::Range(1e-6, 1e6));
     command.add_option("--velocity", read.velocity_name, "Name of the velocity attribute");
     command.add_option("--velocity-unit", velocity_unit, "Metres per: second, frame")->check(CLI::IsMember({"second", "frame"}));
     command.add_option("--up", up, "Axis of the input that points up: z, y")->check(CLI::IsMember({"y", "z"}));

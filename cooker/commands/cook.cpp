@@ -62,6 +62,20 @@ int dry_run(const CookOptions& options) {
     return exit_done;
 }
 
+/// Before hours of work, not after.
+void spare_inputs_of(const CookOptions& options) {
+    CookSettings settings = options.settings;
+    settings.read.warn = {};  // the cook will
+    std::vector<std::filesystem::path> inputs;
+    for (const std::string& path : {options.report, options.depfile, settings.survey}) {
+        std::error_code error;
+        if (!std::filesystem::is_regular_file(path, error)) continue;
+        if (inputs.empty())
+            for (const std::string& input : dependencies(options.input.path, settings)) inputs.emplace_back(input);
+        spare_inputs(path, inputs);
+    }
+}
+
 int cook_command(CookOptions& options, CLI::App& command) {
     std::map<std::string, double> targets;
     if (!options.recipe.empty()) targets = apply_recipe(options.recipe, command);
@@ -74,6 +88,7 @@ int cook_command(CookOptions& options, CLI::App& command) {
     settings.read.first = frames.first, settings.read.last = frames.last, settings.read.step = frames.step;
     if (!options.segment.empty()) parse_segment(options.segment, settings);
     if (options.dry_run) return dry_run(options);
+    spare_inputs_of(options);
     CookReport report;
     {
         Progress progress("cook", options.quiet);

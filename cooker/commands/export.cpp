@@ -54,12 +54,21 @@ void export_animation(AssetPlayer& player, const std::vector<uint32_t>& frames, 
     write_file(options.output, glb.bytes(span / double(frames.size() - 1)));
 }
 
+/// A cell a sixteenth as large has 256 times the triangles: what is asked for by mistake would take all memory.
+constexpr float least_cell = 1 / 16.f;  // of the source's
+
 int export_command(const ExportOptions& options) {
     check_frame_extension(options.output);
     if (options.at_time && !options.frames.empty()) throw UsageError("--time and --frames exclude each other");
     if (options.at_time && has_number_place(options.output)) throw UsageError("--time writes one mesh: name a file without %d");
     const AssetDirectory directory = read_directory(options.asset);
     AssetPlayer player(options.asset, options.jobs);
+    if (options.cell > 0 && options.cell < least_cell * player.info().cell_size) {
+        char text[160];
+        std::snprintf(text, sizeof text, "--cell %g: the source's own resolution is %g m; a sixteenth of that is the least", double(options.cell),
+                      double(player.info().cell_size));
+        throw UsageError(text);
+    }
     if (options.at_time) {
         if (!(options.time >= 0 && options.time <= player.info().seconds))
             throw UsageError("--time lies outside 0 to " + std::to_string(player.info().seconds) + " seconds after the first frame");

@@ -94,6 +94,8 @@ int verify_command(const VerifyOptions& options) {
     ReadOptions read = options.input.checked();
     read.first = frames.first, read.last = frames.last, read.step = frames.step;
     const auto source = open_source_of(options.asset, options.input.path, read);
+    for (const std::string& path : {options.json, options.html})
+        for (size_t i = 0; i < source->info().numbers.size() && !path.empty(); ++i) spare_inputs(path, source->files(i));
     Verification result;
     {
         Progress progress("verify", options.quiet);

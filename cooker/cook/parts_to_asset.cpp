@@ -244,7 +244,8 @@ Linked judge(const json& stored, uint64_t file_bytes) {
 void check_output(const std::string& path) {
     std::error_code error;
     if (std::filesystem::is_directory(path, error)) throw InputError(path + ": cannot be written: is a directory");
-    if (!std::filesystem::is_regular_file(path, error)) return;
+    if (!std::filesystem::exists(path, error)) return;
+    if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": cannot be written: is no regular file");
     std::array<char, sizeof format::magic> begins{};
     std::ifstream file(path, std::ios::binary);
     file.read(begins.data(), begins.size());

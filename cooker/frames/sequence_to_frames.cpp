@@ -126,6 +126,10 @@ private:
             for (glm::vec3& v : mesh.velocities) v = space_ * v;
             for (glm::vec3& n : mesh.normals) n = glm::normalize(space_ * n);
         }
+        if (info_.velocity == VelocityMeaning::none && !mesh.velocities.empty()) {
+            warn_once(name(index) + ": has velocity, but earlier frames have none, so it is not used");
+            mesh.velocities.clear();
+        }
         check_frame(mesh, name(index), [this](const std::string& message) { warn_once(message); });
         return mesh;
     }

@@ -17,6 +17,12 @@ struct Neighbour {
 };
 using Neighbours = std::vector<std::array<Neighbour, 3>>;
 
+/// Written twice, or the other side of the same.
+bool is_same_face(Triangle a, Triangle b) {
+    std::sort(a.begin(), a.end()), std::sort(b.begin(), b.end());
+    return a == b;
+}
+
 Neighbours find_neighbours(const Mesh& mesh) {
     struct Edge {
         uint32_t from, to, triangle, corner;  // from < to
@@ -35,7 +41,7 @@ Neighbours find_neighbours(const Mesh& mesh) {
     Neighbours neighbours(mesh.triangles.size());
     for (size_t i = 0, next; i < edges.size(); i = next) {
         for (next = i + 1; next < edges.size() && edges[next].from == edges[i].from && edges[next].to == edges[i].to;) ++next;
-        if (next - i != 2) continue;
+        if (next - i != 2 || is_same_face(mesh.triangles[edges[i].triangle], mesh.triangles[edges[i + 1].triangle])) continue;
         const Edge &a = edges[i], &b = edges[i + 1];
         neighbours[a.triangle][a.corner] = {b.triangle, a.forward != b.forward};
         neighbours[b.triangle][b.corner] = {a.triangle, a.forward != b.forward};

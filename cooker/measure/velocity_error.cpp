@@ -9,7 +9,9 @@ namespace {
 
 constexpr double least_speed = 0.1;  // of the root mean square
 
+/// Nothing has no direction: half way between right and wrong.
 double degrees_between(const glm::dvec3& a, const glm::dvec3& b) {
+    if (b == glm::dvec3(0)) return 90;
     return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 57.295779513082320877;
 }
 

@@ -41,6 +41,20 @@ std::string plain_pattern(std::string pattern) {
     return pattern;
 }
 
+std::optional<int> whole_number(const std::string& text) {
+    int number = 0;
+    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && stop == text.data() + text.size() ? std::optional(number) : std::nullopt;
+}
+
+/// The number of a file that the pattern, whose one place for it is given, says to be one of the sequence.
+std::optional<int> number_at(const std::string& name, const std::string& pattern, const NumberPlace& place) {
+    const std::string before = pattern.substr(0, place.begin), after = pattern.substr(place.end);
+    if (name.size() < before.size() + after.size() + size_t(std::max(place.width, 1))) return {};
+    if (name.compare(0, before.size(), before) != 0 || name.compare(name.size() - after.size(), after.size(), after) != 0) return {};
+    return whole_number(name.substr(before.size(), name.size() - before.size() - after.size()));
+}
+
 std::string lower(std::string text) {
     for (char& c : text) c = char(std::tolower(static_cast<unsigned char>(c)));
     return text;
@@ -101,7 +115,7 @@ bool is_pattern(const std::string& name) {
     return name.find_first_of("*?#") != std::string::npos || plain_pattern(name) != name;
 }
 
-int frame_number(const fs::path& path, int otherwise) {
+std::optional<int> frame_number(const fs::path& path) {
     std::string name = path.filename().string();
     name = name.substr(0, name.find_last_of('.'));
     if (fs::path(name).extension() == ".bobj") name = fs::path(name).stem().string();  // .bobj.gz
@@ -110,20 +124,24 @@ int frame_number(const fs::path& path, int otherwise) {
     while (end > 0 && !digit(end - 1)) --end;
     size_t begin = end;
     while (begin > 0 && digit(begin - 1)) --begin;
-    int number = otherwise;
-    if (begin < end && std::from_chars(name.data() + begin, name.data() + end, number).ec != std::errc()) return otherwise;
-    return number;
+    if (begin == end) return {};
+    // frame_-008 comes before frame_0000, but of splash-0008 the dash is only a dash.
+    if (begin > 0 && name[begin - 1] == '-' && (begin == 1 || std::string("_. ").find(name[begin - 2]) != std::string::npos)) --begin;
+    return whole_number(name.substr(begin, end - begin));
 }
 
 std::vector<FrameFile> find_frames(const fs::path& directory, const std::string& pattern) {
     const std::string plain = lower(plain_pattern(pattern));
+    const auto place = find_number_place(pattern);
+    const bool is_told = place && !find_number_place(pattern, place->end) && pattern.find_first_of("*?#") == std::string::npos;
     std::error_code error;
     std::vector<FrameFile> files;
     for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
-        if (!matches(lower(at->path().filename().string()), plain) || at->is_directory()) continue;
-        const int number = frame_number(at->path(), -1);
-        if (number < 0) throw InputError(at->path().string() + ": no frame number in the name");
-        files.push_back({number, at->path()});
+        const std::string name = lower(at->path().filename().string());
+        const std::optional<int> number = is_told ? number_at(name, lower(pattern), *place) : frame_number(at->path());
+        if ((is_told ? !number : !matches(name, plain)) || at->is_directory()) continue;
+        if (!number) throw InputError(at->path().string() + ": no frame number in the name");
+        files.push_back({*number, at->path()});
     }
     if (error) throw InputError(directory.string() + ": " + error.message());
     std::sort(files.begin(), files.end(), [](const FrameFile& a, const FrameFile& b) {
@@ -132,7 +150,7 @@ std::vector<FrameFile> find_frames(const fs::path& directory, const std::string&
     for (size_t i = 1; i < files.size(); ++i)
         if (files[i].number == files[i - 1].number)
             throw InputError(files[i].path.string() + ": frame " + std::to_string(files[i].number) + " is also " +
-                             files[i - 1].path.filename().string() + "; name one sequence with a pattern");
+                             files[i - 1].path.filename().string() + "; name one sequence with a pattern, %d where its number stands");
     return files;
 }
 

@@ -3,6 +3,7 @@
 // "a file → a mesh". Adding such a format is one function and one row in frame_formats().
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <functional>
 
 #include "readers/reader.h"
@@ -14,12 +15,13 @@ struct FrameFile {
     std::filesystem::path path;
 };
 /// Files of `directory` whose name matches: `*` any characters, `?` one, `%d` / `%04d` / `####` a number.
-/// Sorted by frame number, which is the last run of digits before the extension. Throws InputError for a
+/// Sorted by frame number, which stands where `%d` says, or else is the last run of digits before the extension. Throws InputError for a
 /// directory that cannot be read and for two files of one number.
 std::vector<FrameFile> find_frames(const std::filesystem::path& directory, const std::string& pattern);
 bool is_pattern(const std::string& name);
-/// The last run of digits before the extension; `otherwise` when there is none or it is no int.
-int frame_number(const std::filesystem::path& path, int otherwise);
+/// The last run of digits before the extension, with a minus that stands first or after `_`, `.` or a blank; nothing when there is
+/// none or it is no int.
+std::optional<int> frame_number(const std::filesystem::path& path);
 
 /// The rate that a JSON file beside the frames states as {"fps": 24}; 0 when it is not there or silent.
 double stated_rate(const std::filesystem::path& json_file);

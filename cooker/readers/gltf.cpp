@@ -30,6 +30,21 @@ namespace {
 using nlohmann::json;
 constexpr const char* draco_extension = "KHR_draco_mesh_compression";
 
+/// A sequence in one file, each frame a node that is shown for a while, as `rill export` writes one: other animation does not matter.
+bool shows_nodes_in_turn(const json& all) {
+    if (!all.contains("animations") || !all["animations"].is_array()) return false;
+    for (const json& animation : all["animations"]) {
+        if (!animation.is_object() || !animation.contains("channels") || !animation["channels"].is_array()) continue;
+        const json& channels = animation["channels"];
+        const auto scales = std::count_if(channels.begin(), channels.end(), [&](const json& channel) {
+            return channel.is_object() && channel.contains("target") && channel["target"].is_object() && channel["target"].contains("path") &&
+                   channel["target"]["path"] == "scale";
+        });
+        if (scales > 1) return true;
+    }
+    return false;
+}
+
 /// The JSON without what is not needed here, and without nesting that would exhaust a recursive reader.
 std::string reduce(const std::string& text, const std::string& name) {
     constexpr int deepest = 32;
@@ -42,6 +57,7 @@ std::string reduce(const std::string& text, const std::string& name) {
                 needed.rfind("KHR_texture_", 0) != 0)
                 throw InputError(name + ": needs the extension '" + needed + "', which is not read");
         }
+    if (shows_nodes_in_turn(all)) throw InputError(name + ": is an animation of many meshes, which is not read; write a file per frame (%04d)");
     json kept = json::object();
     for (const char* key : {"asset", "buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes", "scene"})
         if (all.contains(key)) kept[key] = std::move(all[key]);

@@ -43,7 +43,7 @@ std::unique_ptr<SequenceReader> open_files(const fs::path& path, const ReadOptio
         files = find_frames(directory, path.filename().string());
         if (files.empty()) throw InputError(path.string() + ": no file matches");
     } else {
-        files.push_back({frame_number(path, 1), path});
+        files.push_back({frame_number(path).value_or(1), path});
     }
     return open_frame_files(*format, std::move(files), path.string(), options);
 }
