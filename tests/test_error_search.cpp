@@ -17,8 +17,9 @@ struct Outcome {
 };
 using OfTolerance = std::function<double(double)>;
 /// `ratio(tolerance)`: the error over the one aimed at.
-Outcome search(double edges, const OfTolerance& ratio, const OfTolerance& bytes = [](double t) { return 1e5 / t; }) {
-    ErrorSearch search(edges, 0.2);
+Outcome search(double edges, const OfTolerance& ratio, const OfTolerance& bytes = [](double t) { return 1e5 / t; },
+               double triangles = 60000) {
+    ErrorSearch search(edges, 0.2, triangles);
     Outcome best;
     while (const auto tolerance = search.next()) {
         REQUIRE(*tolerance > 0);
@@ -70,6 +71,13 @@ TEST_CASE("one that falls too slowly to be met is still brought nearer for its b
     const Outcome found = search(0.25, [&](double t) { return 3 * std::pow(t / start, 0.5); });
     CHECK(found.tolerance < start);
     CHECK(found.ratio < 2.5);
+}
+
+TEST_CASE("where the error goes in leaps, as of a few points, attempts go on until one meets it") {
+    const double start = first(0.25);
+    const OfTolerance leap = [&](double t) { return t > 0.4 * start ? 1.2 : 0.95; };
+    CHECK(search(0.25, leap).ratio == 1.2);
+    CHECK(search(0.25, leap, [](double t) { return 1e5 / t; }, 500).ratio == 0.95);
 }
 
 TEST_CASE("missing the target by little is no better than being too fine") {

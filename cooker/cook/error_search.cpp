@@ -9,7 +9,7 @@
 namespace rill::cooker {
 namespace {
 
-constexpr size_t most_attempts = 3;
+constexpr size_t most_attempts = 3, most_of_leaps = 6;
 constexpr double finer_by = 0.1;    // an error below its target by more is bytes nobody asked for, and worth another attempt
 constexpr double most_finer = 0.3;  // of a tolerance, the next one
 constexpr double most_coarser = 2;
@@ -41,12 +41,12 @@ std::optional<double> ErrorSearch::next() const {
     const double least = least_tolerance / edges_;
     if (attempts_.empty()) return std::max(first_tolerance(edges_, wall_share_), least);
     const Attempt& last = attempts_.back();
-    if (is_near(last.y) || attempts_.size() == most_attempts) return {};
+    if (is_near(last.y) || attempts_.size() == (leaps_ ? most_of_leaps : most_attempts)) return {};
     double power = edges_ < 0.2 ? 1.3 : 0.9;  // of the tolerance, by the error's
     if (attempts_.size() > 1) {
         const bool is_told = last.x - attempts_[attempts_.size() - 2].x < std::log(tells);
-        if (is_told && !is_met(last.y + std::max(slope(), 0.0) * std::log(most_finer))) return {};
-        if (slope() > 0) power = std::clamp(1 / slope(), 0.7, 2.0);
+        if (is_told && !leaps_ && !is_met(last.y + std::max(slope(), 0.0) * std::log(most_finer))) return {};
+        if (slope() > 0 || leaps_) power = slope() > 0 ? std::clamp(1 / slope(), 0.7, 2.0) : 2.0;
     }
     const double finer = std::exp(last.x + std::clamp(-power * last.y, std::log(most_finer), std::log(most_coarser)));
     if (finer < least && !(last.x > std::log(least) + 1e-9)) return {};  // there already

@@ -10,8 +10,10 @@ namespace rill::cooker {
 
 class ErrorSearch {
 public:
-    /// `edges`: the error aimed at, in median edges of the source; `wall_share`: of its surface that lies in walls (survey.h).
-    ErrorSearch(double edges, double wall_share) : edges_(edges), wall_share_(wall_share) {}
+    /// `edges`: the error aimed at, in median edges of the source; `wall_share`: of its surface that lies in walls (survey.h);
+    /// `triangles`: of a frame. Where there are few the error goes in leaps, and attempts cost nothing: there are more of them.
+    ErrorSearch(double edges, double wall_share, double triangles)
+        : edges_(edges), wall_share_(wall_share), leaps_(triangles < 2000) {}
     /// The tolerance to try next, in the error aimed at; empty when there is nothing more to win.
     std::optional<double> next() const;
     /// What came of it: its error, in the one aimed at (nothing to measure: 1), and its bytes. True: the best so far.
@@ -28,6 +30,7 @@ private:
     double slope() const;
 
     double edges_, wall_share_;
+    bool leaps_;
     std::vector<Attempt> attempts_;
     size_t best_ = 0;
 };

@@ -136,7 +136,7 @@ void SpanCook::run(uint32_t span, const std::string& output, const std::function
 
 SpanResult SpanCook::at_error(uint32_t span, const std::string& candidate, const std::string& best, const std::function<void(uint32_t)>& done) const {
     const ChosenFrames judged(reader_, judged_frames_of(span));
-    ErrorSearch search(aim_.p99 / survey_.edge, survey_.wall_share);
+    ErrorSearch search(aim_.p99 / survey_.edge, survey_.wall_share, survey_.triangles / reader_.info().numbers.size());
     SpanResult kept;
     while (const std::optional<double> tolerance = search.next()) {
         const bool is_first = search.attempts() == 0;

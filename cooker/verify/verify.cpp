@@ -41,12 +41,19 @@ double area_of(const Mesh& mesh) {
     return area;
 }
 
-constexpr size_t few_triangles = 2000;  // of so few a part is no fair sample, and all are soon measured
+/// A third of the samples, unless there are so few that a third is no fair share of them. The same for all frames, for they are weighted by what is
+/// measured of them.
+size_t stride_of_glance(const SequenceReader& source) {
+    constexpr size_t few_triangles = 2000;
+    const size_t count = source.info().numbers.size();
+    for (const size_t frame : {size_t(0), count / 2, count - 1})
+        if (source.read_surface(frame).triangles.size() >= few_triangles) return 3;
+    return 1;
+}
 
 FrameMeasure measure_plainly(const Mesh& source, AssetPlayer& player, double seconds, double cell, size_t stride) {
     const Mesh decoded = player.mesh(seconds);
     FrameMeasure frame = measure(source, decoded, cell);
-    if (source.triangles.size() < few_triangles) stride = 1;
     frame.distance = surface_distance(source, SurfaceIndex(source), decoded, SurfaceIndex(decoded), false, stride);
     return frame;
 }
@@ -169,7 +176,7 @@ Verification verify(const std::string& asset, const SequenceReader& source, int 
     result.edge = directory.header.cell_size;
     result.bytes_per_frame = double(directory.header.file_bytes) / directory.header.frame_count;
     const bool details = result.details = scrutiny == Scrutiny::close;
-    const size_t stride = scrutiny == Scrutiny::glance ? 3 : 1;
+    const size_t stride = scrutiny == Scrutiny::glance ? stride_of_glance(source) : 1;
     if (std::none_of(places.begin(), places.end(), is_between)) read_target(result, directory.settings_json);
     const SourceVelocity velocity = details ? velocity_of(source) : SourceVelocity{};
     // A run of neighbouring frames per task, one player each: its windows are decoded about once.
