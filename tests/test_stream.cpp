@@ -437,6 +437,8 @@ TEST_CASE("workers to spare decode prefetch between frames, a little at a time")
         CHECK(play_through(playing, [](int) {}) == expected);
         REQUIRE(!jobs.prefetch.empty());
         CHECK(rill::destroy(playing.player) == Status::pending);
+        CHECK(play_through(playing, [](int) {}) == expected);  // one who thinks better of it
+        CHECK(rill::destroy(playing.player) == Status::pending);
         jobs.run_prefetch();
         CHECK(rill::destroy(playing.player) == Status::ok);
         playing.player = nullptr;

@@ -214,7 +214,8 @@ bool stop_unpacking(Residency& r) noexcept {
     bool stopped = true;
     for (Unpacking& job : r.unpacking) {
         uint32_t phase = Unpacking::queued;
-        job.phase.compare_exchange_strong(phase, Unpacking::taken, std::memory_order_acq_rel);
+        if (job.phase.compare_exchange_strong(phase, Unpacking::taken, std::memory_order_acq_rel))
+            r.chunks[job.chunk].state = ChunkState::arrived;  // as before, should there be another frame
         phase = job.phase.load(std::memory_order_acquire);
         stopped = stopped && (phase == Unpacking::idle || phase == Unpacking::done);
     }

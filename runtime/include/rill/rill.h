@@ -49,8 +49,9 @@ struct Jobs {
     /// needed_this_frame is false for prefetch: submitted in end_frame() when there are several workers, it may yield to the
     /// engine's own work and take any time, but must run before destroy() can end. A frame that needs it earlier does it itself.
     void (*submit)(void* user, Task task, void* context, uint32_t count, bool needed_this_frame);
-    /// Called in a loop while end_frame() waits, and by destroy(): run one job (rather one that is needed this frame), or yield. By several threads at once when several drive Players:
-    /// each needs a worker number of its own, or only one of them at a time runs a job.
+    /// Called in a loop while end_frame() waits, and by destroy(): run one job (rather one that is needed this frame), or
+    /// yield. By several threads at once when several drive Players: each needs a worker number of its own, or only one of
+    /// them at a time runs a job.
     void (*help)(void* user);
 };
 
