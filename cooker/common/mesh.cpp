@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <numeric>
-#include <tuple>
+
+#include "common/mesh_edges.h"
 
 namespace rill::cooker {
 
@@ -81,18 +82,7 @@ bool is_closed(const Mesh& mesh) {
 
 std::vector<OpenEdge> open_edges(const Mesh& mesh) {
     if (is_closed(mesh)) return {};
-    struct Edge {
-        uint64_t ends;
-        uint32_t triangle, corner;
-    };
-    std::vector<Edge> edges;
-    edges.reserve(3 * mesh.triangles.size());
-    for (uint32_t i = 0; i < mesh.triangles.size(); ++i)
-        for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t a = mesh.triangles[i][k], b = mesh.triangles[i][(k + 1) % 3];
-            edges.push_back({uint64_t(std::min(a, b)) << 32 | std::max(a, b), i, k});
-        }
-    std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return std::tuple(a.ends, a.triangle, a.corner) < std::tuple(b.ends, b.triangle, b.corner); });
+    const std::vector<MeshEdge> edges = sorted_edges(mesh.triangles);
     std::vector<OpenEdge> open;
     for (size_t i = 0, next; i < edges.size(); i = next) {
         for (next = i + 1; next < edges.size() && edges[next].ends == edges[i].ends;) ++next;

@@ -13,6 +13,8 @@
 #include <new>
 #include <unordered_map>
 
+#include "common/mesh_edges.h"
+
 namespace rill::cooker {
 namespace {
 
@@ -189,10 +191,6 @@ public:
     }
 
 private:
-    struct Edge {
-        uint64_t ends;
-        uint32_t triangle, corner;  ///< it goes on from that corner
-    };
     static constexpr uint32_t none = ~0u;
 
     glm::dvec2 at(uint32_t v) const { return {flat_.positions[v][plane_.u], flat_.positions[v][plane_.v]}; }
@@ -208,16 +206,10 @@ private:
     }
 
     void find_neighbours() {
-        std::vector<Edge> edges;
-        for (uint32_t i = 0; i < flat_.triangles.size(); ++i)
-            for (uint32_t k = 0; k < 3; ++k) {
-                const uint32_t a = flat_.triangles[i][k], b = flat_.triangles[i][(k + 1) % 3];
-                edges.push_back({uint64_t(std::min(a, b)) << 32 | std::max(a, b), i, k});
-            }
-        std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.ends != b.ends ? a.ends < b.ends : a.triangle < b.triangle; });
+        const std::vector<MeshEdge> edges = sorted_edges(flat_.triangles);
         for (size_t i = 0, next; i < edges.size(); i = next) {
             for (next = i + 1; next < edges.size() && edges[next].ends == edges[i].ends;) ++next;
-            const Edge &one = edges[i], &other = edges[next - 1];
+            const MeshEdge &one = edges[i], &other = edges[next - 1];
             if (next - i != 2 || flat_.triangles[one.triangle][one.corner] == flat_.triangles[other.triangle][other.corner]) continue;
             beside_[one.triangle][one.corner] = other.triangle, beside_[other.triangle][other.corner] = one.triangle;
             asked_.emplace_back(one.triangle, one.corner);

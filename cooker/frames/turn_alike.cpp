@@ -2,8 +2,9 @@
 #include "frames/turn_alike.h"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
+
+#include "common/mesh_edges.h"
 
 namespace rill::cooker {
 namespace {
@@ -24,27 +25,16 @@ bool is_same_face(Triangle a, Triangle b) {
 }
 
 Neighbours find_neighbours(const Mesh& mesh) {
-    struct Edge {
-        uint32_t from, to, triangle, corner;  // from < to
-        bool forward;
-    };
-    std::vector<Edge> edges;
-    edges.reserve(3 * mesh.triangles.size());
-    for (uint32_t i = 0; i < mesh.triangles.size(); ++i)
-        for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t a = mesh.triangles[i][k], b = mesh.triangles[i][(k + 1) % 3];
-            edges.push_back({std::min(a, b), std::max(a, b), i, k, a < b});
-        }
-    std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-        return std::tie(a.from, a.to, a.triangle, a.corner) < std::tie(b.from, b.to, b.triangle, b.corner);
-    });
+    const std::vector<MeshEdge> edges = sorted_edges(mesh.triangles);
     Neighbours neighbours(mesh.triangles.size());
     for (size_t i = 0, next; i < edges.size(); i = next) {
-        for (next = i + 1; next < edges.size() && edges[next].from == edges[i].from && edges[next].to == edges[i].to;) ++next;
-        if (next - i != 2 || is_same_face(mesh.triangles[edges[i].triangle], mesh.triangles[edges[i + 1].triangle])) continue;
-        const Edge &a = edges[i], &b = edges[i + 1];
-        neighbours[a.triangle][a.corner] = {b.triangle, a.forward != b.forward};
-        neighbours[b.triangle][b.corner] = {a.triangle, a.forward != b.forward};
+        for (next = i + 1; next < edges.size() && edges[next].ends == edges[i].ends;) ++next;
+        if (next - i != 2) continue;
+        const MeshEdge &a = edges[i], &b = edges[i + 1];
+        const Triangle &one = mesh.triangles[a.triangle], &other = mesh.triangles[b.triangle];
+        if (is_same_face(one, other)) continue;
+        const bool alike = one[a.corner] != other[b.corner];  // they go opposite ways along it
+        neighbours[a.triangle][a.corner] = {b.triangle, alike}, neighbours[b.triangle][b.corner] = {a.triangle, alike};
     }
     return neighbours;
 }
