@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Budgets of time and room under a hostile camera. Time is simulated: every position that the field is asked for costs,
 // with noise, so that what is tested is the judgement and not the machine.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <random>

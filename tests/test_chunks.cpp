@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Quantising, coding and decoding of tracks: what goes in comes out to the bit, within the promised error, and no
 // bytes whatever do harm.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The `rill` tool cooks: exit codes, messages, files left and not left behind.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
 #include <csignal>
 #include <functional>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The `rill` tool looks at assets, measures and exports them: exit codes, messages, reports.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <functional>
 #include <set>
 

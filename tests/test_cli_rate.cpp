@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The `rill` tool cooks to a rate; apart from test_cli, for it takes most of the time.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "cli_harness.h"
 
 TEST_CASE("cook: a rate is met within 3 %, by the best error that it allows") {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The box that liquid stands in: field and mesh end at its walls, and at the bevels between them, exactly.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -152,4 +151,31 @@ TEST_CASE("edges between walls are cut off where they are not sharp") {
             for (const uint32_t workers : {2u, 8u}) CHECK(mesh(real.field, {cell, 200000, workers}).position == m.position);
         }
     }
+}
+
+TEST_CASE("sharp rims are where the liquid meets the wall, whether it rises towards it or falls") {
+    Cloud ball;
+    add_sphere(ball, {0, 0, 0}, 1, 4000);
+    const double rim = 0.8;  // radius
+    for (const float wall : {-0.6f, 0.6f})
+        for (const float cell : {0.1f, 0.0937f, 0.05f, 0.0437f}) {
+            CAPTURE(wall);
+            CAPTURE(cell);
+            surface::Container container = surface::everywhere;
+            container.upper[0] = wall, container.sharp = 0b000010u;
+            const RealField real(ball, container);
+            const Mesh m = mesh(real.field, {cell});
+            CHECK(topology(m).closed_manifold());
+            const auto bins = size_t(pi * rim / cell);  // of two cells: none is without a vertex
+            std::vector<double> farthest(bins, 0);
+            for (uint32_t v = 0; v < m.vertex_count(); ++v) {
+                const Vec at = m.at(v);
+                if (at[0] < wall - cell / 100) continue;
+                const double turn = std::atan2(at[2], at[1]) / (2 * pi) + 0.5;
+                double& r = farthest[std::min(size_t(turn * double(bins)), bins - 1)];
+                r = std::max(r, std::hypot(at[1], at[2]));
+            }
+            for (const double r : farthest) CHECK(std::fabs(r - rim) < 0.2 * cell);
+            for (const uint32_t workers : {2u, 8u}) CHECK(mesh(real.field, {cell, 200000, workers}).position == m.position);
+        }
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The whole way: meshes of a liquid whose every moment is known are cooked, and what the runtime makes of the asset
 // is held against them.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -100,7 +99,7 @@ SurfaceDistance distance(const Mesh& a, const Mesh& b) { return surface_distance
 
 }  // namespace
 
-TEST_CASE("a glance at a third of the samples finds about the same errors") {
+TEST_CASE("a glance at a third of the samples finds about the same errors" * doctest::test_suite("threads")) {
     const auto source = open_sequence(whole().input, {});
     const Verification glance = verify(whole().asset, *source, 2, {}, Scrutiny::glance), plain = verify(whole().asset, *source, 2);
     CHECK(glance.p99 == doctest::Approx(plain.p99).epsilon(0.04));
@@ -145,7 +144,7 @@ TEST_CASE("between frames the surface is where the liquid was") {
     }
 }
 
-TEST_CASE("the same input gives the same bytes at 1, 2 and 8 jobs") {
+TEST_CASE("the same input gives the same bytes at 1, 2 and 8 jobs" * doctest::test_suite("threads")) {
     const std::string bytes = get_file(whole().asset);
     Cooked again(of_frame);
     for (int jobs : {1, 8}) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Liquid that was cut off at the sides of its domain is closed there, flat, exactly and evenly.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -58,7 +57,17 @@ void turn(Mesh& mesh) {
     for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
-Cut cut_of(const Mesh& mesh) { return find_cut(wall_facts(mesh, median_edge(mesh)), median_edge(mesh)); }
+Cut cut_of(const std::vector<Mesh>& frames) {
+    const float edge = median_edge(frames[0]);
+    WallFacts facts;
+    RimOfPatch rim;
+    for (const Mesh& mesh : frames) {
+        const WallFacts of_frame = wall_facts(mesh, edge);
+        facts.add(of_frame, edge), rim.add(rim_of_patch(mesh, of_frame.lower, of_frame.upper));
+    }
+    return find_cut(facts, rim, edge);
+}
+Cut cut_of(const Mesh& mesh) { return cut_of(std::vector{mesh}); }
 Mesh closed(Mesh mesh) {
     close_at_sides(mesh, cut_of(mesh));
     return mesh;
@@ -76,6 +85,18 @@ Mesh waves(double seconds) {
         const float phase = 4 * x.x + 3 * x.y - 5 * float(seconds);
         x.z = 0.06f * std::sin(phase);
         mesh.velocities.emplace_back(0, 0, -0.3f * std::cos(phase));
+    }
+    return mesh;
+}
+
+/// The same as the sea does it: water goes round in circles, so the rim goes to and fro, by more than a cell.
+Mesh rolling_waves(double seconds) {
+    Mesh mesh = plane(48, 2);
+    const glm::vec3 ahead(0.8f, 0.6f, 0);
+    for (glm::vec3& x : mesh.positions) {
+        const float phase = 5 * glm::dot(ahead, x) - 5 * float(seconds);
+        x += -0.05f * std::sin(phase) * ahead + glm::vec3(0, 0, 0.06f * std::cos(phase));
+        mesh.velocities.push_back(0.25f * std::cos(phase) * ahead + glm::vec3(0, 0, 0.3f * std::sin(phase)));
     }
     return mesh;
 }
@@ -142,6 +163,7 @@ TEST_CASE("waves without a floor stand on one, some way down") {
     const Mesh open = waves(0);
     const Cut cut = cut_of(open);
     CHECK(cut.sides == 15);
+    CHECK(cut.moving == 0);
     const Mesh whole = closed(open);
     check_closed(whole);
     const float depth = -cut.lower.z;
@@ -157,6 +179,48 @@ TEST_CASE("waves without a floor stand on one, some way down") {
     Mesh full = waves(0);
     for (glm::vec3& x : full.positions) x.z = 0;
     check_closed(closed(full));
+}
+
+TEST_CASE("a patch of waves whose rim moves sideways is carried on to its bounds, level, and closed there") {
+    std::vector<Mesh> frames;
+    for (int i = 0; i < 6; ++i) frames.push_back(rolling_waves(i / 12.));
+    const Cut cut = cut_of(frames);
+    CHECK(cut.sides == 15);
+    CHECK(cut.moving == 15);
+    for (const Mesh& open : frames) {
+        Mesh whole = open;
+        close_at_sides(whole, cut);
+        check_closed(whole);
+        const WallFacts facts = wall_facts(whole, cut.edge);
+        CHECK((facts.walls(cut.edge) & 31) == 31);  // sides and floor
+        CHECK(glm::distance(facts.lower, cut.lower) < cut.within());
+        for (int a = 0; a < 2; ++a) CHECK(std::fabs(facts.upper[a] - cut.upper[a]) < cut.within());
+        const glm::dvec3 extent = cut.upper - cut.lower;
+        CHECK(signed_volume(whole) == doctest::Approx(extent.x * extent.y * double(-cut.lower.z)).epsilon(0.03));
+        // The strips go on outward, nowhere back; what they end in moves along its side.
+        size_t folded = 0, moving = 0;
+        for (const Triangle& t : whole.triangles) {
+            const glm::vec3 a = whole.positions[t[0]], normal = unit_normal(glm::cross(whole.positions[t[1]] - a, whole.positions[t[2]] - a));
+            folded += a.z > -0.1f && normal.z < -0.01f;
+        }
+        CHECK(folded == 0);
+        for (size_t v = open.positions.size(); v < whole.positions.size(); ++v) {
+            const glm::vec3 x = whole.positions[v], u = whole.velocities[v];
+            if (u != glm::vec3(0)) ++moving;
+            for (int a = 0; a < 2; ++a)
+                if (std::min(x[a] - cut.lower[a], cut.upper[a] - x[a]) < cut.within()) CHECK(std::fabs(u[a]) < 0.02f);  // 0, but for what came there by itself
+        }
+        CHECK(moving > 150);
+    }
+    // A sea with a hole in it is no such patch, nor is one that is open on three sides only.
+    for (const bool middle : {true, false}) {
+        Mesh torn = frames[0];
+        if (middle)
+            torn.triangles.erase(torn.triangles.begin() + 2000, torn.triangles.begin() + 2040);
+        else
+            torn = cut_off(torn, 0, true, 0.05f), torn.positions.push_back({-1, 0, 0}), torn.triangles.push_back({uint32_t(torn.positions.size() - 1), 0, 1}), torn.velocities.emplace_back(0);
+        CHECK(cut_of(torn).moving == 0);
+    }
 }
 
 TEST_CASE("liquid in the domain's corner takes the corner in") {
@@ -286,14 +350,37 @@ TEST_CASE("a sequence that is cut off cooks like a whole one, and is verified ag
     CHECK(get_file(folder / "again.rill") == get_file(folder / "out.rill"));
 }
 
+TEST_CASE("slow rolling waves: cooked as well, with the velocity that the coded points have not") {
+    const TestFolder folder;
+    for (int i = 0; i < 4; ++i) put_file(folder / "in" + "/f" + std::to_string(1 + i) + ".ply", plain_ply(rolling_waves(i / 24.)));
+    double degrees[2] = {};
+    for (const bool slip : {false, true}) {
+        std::vector<std::string> warnings;
+        CookSettings settings;
+        settings.jobs = 2, settings.slip = slip, settings.read.warn = [&](const std::string& text) { warnings.push_back(text); };
+        const std::string asset = folder / (slip ? "slip.rill" : "none.rill");
+        CHECK(cook(folder / "in", asset, settings, [](const CookProgress&) {}).target_met);
+        CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& w) { return w.find("moves sideways") != std::string::npos; }));
+        const auto source = open_source_of(asset, folder / "in", {});
+        const Verification result = verify(asset, *source, 2, {}, Scrutiny::close);
+        for (const FrameMeasure& frame : result.frames) {
+            CHECK(frame.source.open_edges == 0);
+            CHECK(frame.decoded.open_edges == 0);
+        }
+        degrees[slip] = result.velocity.degrees.mean();
+    }
+    CHECK(degrees[1] < 0.75 * degrees[0]);
+}
+
 TEST_CASE("a cut as it is stored") {
-    const Cut cut{0b010011, {-1, -2, -3}, {4, 5.5f, 6}, 0.125f};
+    const Cut cut{0b010011, {-1, -2, -3}, {4, 5.5f, 6}, 0.125f, 0b000010};
     const nlohmann::json json = nlohmann::json::parse(cut_json(cut).dump());
     const Cut back = cut_from_json(json);
     CHECK(back.sides == cut.sides);
     CHECK(back.lower == cut.lower);
     CHECK(back.upper == cut.upper);
     CHECK(back.edge == cut.edge);
+    CHECK(back.moving == cut.moving);
     nlohmann::json bad = json;
     SUBCASE("no edge") { bad.erase("edge"); }
     SUBCASE("edge of nothing") { bad["edge"] = 0; }

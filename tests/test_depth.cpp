@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Whether decoded liquid is too thin, told from balls of known size.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include "shapes.h"

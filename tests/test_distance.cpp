@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The error metric against closed forms and brute force.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -76,7 +76,7 @@ TEST_CASE("closest point equals brute force, also on slivers and degenerate tria
     }
 }
 
-TEST_CASE("an index built by many threads answers as one built by one") {
+TEST_CASE("an index built by many threads answers as one built by one" * doctest::test_suite("threads")) {
     const Mesh mesh = sphere(120, 1, {0.3f, 0, 0});  // with corners that many triangles share: equals must be told apart alike
     REQUIRE(mesh.triangles.size() > 10000);
     const SurfaceIndex alone(mesh);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Small pieces of liquid: which are taken for ellipsoids, how near those come, and how they are tracked.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

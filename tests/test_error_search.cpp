@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The search for the tolerance that meets an error, on errors and sizes that are formulas.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The blended field against surfaces that are known: how near, how steep, how it converges, what thin liquid and stray
 // points do to it.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "field_harness.h"
 #include "surface/field_kernels.h"
 

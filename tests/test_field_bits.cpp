@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What decides a bit of the field, and what does not: candidates, batches, instruction sets, the order of points; and that
 // broken points and degenerate neighbourhoods leave every value finite.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "field_harness.h"
 #include "surface/field_kernels.h"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Drops and bubbles in the field, and points that come and go.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "field_harness.h"
 
 using namespace field_test;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // File bytes are hostile: ladders over every length and every bit of header and directory.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <sys/stat.h>

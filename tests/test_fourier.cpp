@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The time basis: orthonormal on the samples, as good as a Fourier extension should be, and a spline between them.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

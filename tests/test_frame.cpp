@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // A frame from chunks to buffers: right place, right time, any capacity, any number of workers, no allocation.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <memory>
@@ -143,7 +142,7 @@ TEST_CASE("the surface does not jump where windows meet") {
     CHECK(rill::cooker::surface_distance(before, a, after, b).max < 0.002);
 }
 
-TEST_CASE("the same bytes at any number of workers, and in any order of tasks") {
+TEST_CASE("the same bytes at any number of workers, and in any order of tasks" * doctest::test_suite("threads")) {
     std::vector<uint64_t> hashes;
     const auto play = [&](const rill::Jobs& jobs) {
         Opened opened(ball());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Cells of different size side by side: no crack, no edge of three triangles, wherever the camera stands; errors in
 // proportion to the cells; work in proportion to what is near.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <map>

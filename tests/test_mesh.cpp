@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The mesher: closed 2-manifolds from the real field and from the worst of noise, within stated bounds,
 // the same bytes at any number of workers (1, 2, 8 of std::thread), and drawable at every capacity.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -362,7 +361,7 @@ TEST_CASE("gyroid noise: closed 2-manifold found from one seed per piece, on the
     }
 }
 
-TEST_CASE("the same bytes at any number of workers") {
+TEST_CASE("the same bytes at any number of workers" * doctest::test_suite("threads")) {
     Cloud cloud = sphere_cloud(500);
     add_torus(cloud, 1.6, 0.25, 60);
     cloud.add_drop({0.31, 0.02, 2.53}, {0.2, 0.3, 0.1});

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Playing from simulated disks and networks, in simulated time: latency, bandwidth, failures; loops and seeks; files
 // far larger than memory; many players of one file.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <random>

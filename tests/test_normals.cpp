@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Vertex normals: how far they lean from the gradient towards the triangles, and that they do so without a jump. The
 // surfaces here are balls whose gradients all lie: tilted by the same angle from what the triangles say.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include "mesh_harness.h"

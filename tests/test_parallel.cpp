@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The cooker's threads: every index once, work within work, and exceptions that end it.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <atomic>
 #include <chrono>
 #include <stdexcept>
@@ -14,7 +13,7 @@
 
 using namespace rill::cooker;
 
-TEST_CASE("every index is worked once, by any number of threads, within work, too") {
+TEST_CASE("every index is worked once, by any number of threads, within work, too" * doctest::test_suite("threads")) {
     for (const int jobs : {1, 2, 3, 8}) {
         for (const size_t count : {size_t(0), size_t(1), size_t(2), size_t(1000)}) {
             std::vector<std::atomic<int>> times(count);
@@ -28,7 +27,7 @@ TEST_CASE("every index is worked once, by any number of threads, within work, to
     }
 }
 
-TEST_CASE("as many threads as were asked for work at once") {
+TEST_CASE("as many threads as were asked for work at once" * doctest::test_suite("threads")) {
     constexpr size_t threads = 4;
     std::atomic<size_t> present{0};
     const auto late = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -39,7 +38,7 @@ TEST_CASE("as many threads as were asked for work at once") {
     CHECK(std::chrono::steady_clock::now() < late);
 }
 
-TEST_CASE("an exception ends the work, and comes out where it was called") {
+TEST_CASE("an exception ends the work, and comes out where it was called" * doctest::test_suite("threads")) {
     for (const int jobs : {1, 4}) {
         std::atomic<size_t> worked{0};
         const auto fail = [&] {
@@ -58,7 +57,7 @@ TEST_CASE("an exception ends the work, and comes out where it was called") {
     }
 }
 
-TEST_CASE("who was asked to stop takes no more work") {
+TEST_CASE("who was asked to stop takes no more work" * doctest::test_suite("threads")) {
     interrupting_signal = 2;
     std::atomic<size_t> worked{0};
     CHECK_THROWS_AS(parallel_for(100, 4, [&](size_t) { ++worked; }), Interrupted);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // rill-player and rill-hello as programs: what they draw without a display, and how they fail.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #pragma GCC diagnostic push

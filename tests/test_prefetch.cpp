@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Prefetch decoded between frames: by jobs that run at once, late, beside a frame that wants the same, or never.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <cmath>
@@ -70,7 +69,7 @@ Played play_through(Playing& playing, Between between) {
 
 }  // namespace
 
-TEST_CASE("workers to spare decode prefetch between frames, a little at a time") {
+TEST_CASE("workers to spare decode prefetch between frames, a little at a time" * doctest::test_suite("threads")) {
     Played expected;
     {
         Opened opened(ball());
@@ -126,7 +125,7 @@ TEST_CASE("workers to spare decode prefetch between frames, a little at a time")
     jobs.run_prefetch();
 }
 
-TEST_CASE("prefetch that does not decode is rejected once, wherever that was tried") {
+TEST_CASE("prefetch that does not decode is rejected once, wherever that was tried" * doctest::test_suite("threads")) {
     for (const bool spare : {false, true}) {
         HoldingJobs jobs;
         Opened opened(ball());

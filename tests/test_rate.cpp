@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The search for the tolerance that meets a rate, on sizes that are formulas.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Every input format, and every kind of bad input: one line that names file and cause, never a crash.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <limits>

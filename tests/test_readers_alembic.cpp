@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Alembic: files that the Alembic library wrote, archives put together here, and damaged ones.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <functional>

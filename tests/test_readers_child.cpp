@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // What happens to a library in a child process happens to nobody else.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <unistd.h>

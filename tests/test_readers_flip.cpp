@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // FLIP Fluids caches: a real one, small ones written here, and damaged ones.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include "frames/open_sequence.h"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // glTF and GLB: transforms, merged and compressed primitives, and damaged files.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <nlohmann/json.hpp>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // OpenVDB level sets as an input. Without the library: that the tool says so.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include "frames/open_sequence.h"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Drops and bubbles without a single point: by cells or by meshes of their own, at their size and closed.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Sources that are not as a fluid mesher makes them: uneven triangles, a vertex per corner.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>

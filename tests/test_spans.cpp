@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Spans: cooked anywhere, in any order, interrupted and resumed, they make the same asset to the byte.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

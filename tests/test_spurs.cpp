@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Decoded liquid that the source does not have: the cooker meshes what points decode to, finds it, and bears points there.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -36,7 +35,7 @@ std::vector<Path> repaired(const SurfaceFrame& frame, int sample, const std::vec
 
 }  // namespace
 
-TEST_CASE("points mesh to the closed surface they mean, the same with any number of threads") {
+TEST_CASE("points mesh to the closed surface they mean, the same with any number of threads" * doctest::test_suite("threads")) {
     const std::vector<SurfacePoint> points = points_of(24, radius);
     const Mesh mesh = mesh_points(points, 0.03f);
     const Topology shape = topology(mesh);
@@ -99,7 +98,7 @@ TEST_CASE("at a spur a point is born where others would stand too close") {
     CHECK(choose_births(frame, residual, close, 0.1f * frame.edge, 0.25f * frame.edge).empty());
 }
 
-TEST_CASE("what is torn is repaired by points that leave less off the source, the same with any number of threads") {
+TEST_CASE("what is torn is repaired by points that leave less off the source, the same with any number of threads" * doctest::test_suite("threads")) {
     const SurfaceFrame frame = frame_of_ball();
     const std::vector<SurfacePoint> whole = points_of(24, radius);
     const float beyond = 0.7f * frame.edge;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Streaming: tickets that are late, out of order, failing, refused; residency and eviction; misuse.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <atomic>
@@ -330,7 +329,7 @@ TEST_CASE("waiting for data ends, whatever the IO does") {
     CHECK(hopeless.stats.chunks_late == 6);
 }
 
-TEST_CASE("of threads that wait at once, one at a time helps as worker 0") {
+TEST_CASE("of threads that wait at once, one at a time helps as worker 0" * doctest::test_suite("threads")) {
     rill::ThreadPool* pool = rill::start_threads(2);
     const rill::Jobs jobs = rill::thread_jobs(pool);
     struct Shared {
@@ -352,7 +351,7 @@ TEST_CASE("of threads that wait at once, one at a time helps as worker 0") {
     rill::stop_threads(pool);
 }
 
-TEST_CASE("waiting gets along with files and threads") {
+TEST_CASE("waiting gets along with files and threads" * doctest::test_suite("threads")) {
     const std::string path = scratch_path("threads.rill");
     write_ball({}, path);
     uint64_t bytes = 0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which tracks a window keeps: brief ones that their neighbours make up for go, those that mend a frame end when it is
 // mended, and ends that coding takes off the surface are cut. And coefficients chosen against what all tracks decode to.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -196,7 +195,7 @@ TEST_CASE("what a point does to the decoded surface is known to first order") {
     }
 }
 
-TEST_CASE("coefficients chosen anew make up for each other, the same for any number of threads") {
+TEST_CASE("coefficients chosen anew make up for each other, the same for any number of threads" * doctest::test_suite("threads")) {
     Window window = standing_ball();
     WindowGoal goal = goal_of(window);
     grow_tracks(window, {}, goal);
@@ -310,7 +309,7 @@ TEST_CASE("the volume of thin liquid is the source's") {
     CHECK(std::fabs(mean - 1) < 0.0025);
 }
 
-TEST_CASE("heights of few points are stepped until the volume is the source's, and no more; the same for any number of threads") {
+TEST_CASE("heights of few points are stepped until the volume is the source's, and no more; the same for any number of threads" * doctest::test_suite("threads")) {
     Window window = standing_ball();
     WindowGoal goal = goal_of(window, 0.6f);
     grow_tracks(window, {}, goal);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // A trial is what a field of its own would be, and leaves no trace.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <random>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Whether velocity carries the surface: units, sign and direction found out; velocity estimated where there is none.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

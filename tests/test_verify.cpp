@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // What `rill verify` says of velocity, thin liquid, coarse cells and the time between frames, on surfaces known by formula.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

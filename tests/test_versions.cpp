@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Goldens: one asset of every format version there was, made by golden/make.sh and kept for ever, with what it was
 // and decoded to then. Each must load and decode to the same water, or be refused as unknown_format.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <nlohmann/json.hpp>
 
 #include "asset/asset_directory.h"

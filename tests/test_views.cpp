@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a camera sees and what that costs: bytes, points and cells follow the frustum and the distance, and nothing in
 // sight is missing, torn, or different from what a wider view shows.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "harness.h"
 
 #include <map>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Liquid in a box: which sides of its bounds are walls, and that what is decoded ends at them exactly.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>

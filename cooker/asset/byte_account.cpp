@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "asset/byte_account.h"
 
+#include <nlohmann/json.hpp>
+
 #include <array>
 #include <cmath>
 #include <memory>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Where the bytes of an asset are: every one of them, read out of the file itself.
 #pragma once
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "asset/asset_directory.h"

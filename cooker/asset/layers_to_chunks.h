@@ -54,6 +54,8 @@ using ProjectAlong = std::function<float(uint32_t sample, const glm::vec3& x, co
 QuantisedTrack quantise_track(const TrackSamples& track, const Quantiser& quantiser,
                               const glm::vec3& origin, const format::BasisTables& tables,
                               const ProjectAlong& project = {});
+/// Quantises the slip of a track of points anew, m/s; the rest stays.
+void set_slip(QuantisedTrack& track, const glm::vec3& slip, const Quantiser& quantiser, const glm::vec3& origin);
 /// What a decoder makes of the quantised track at its samples (normals unit).
 TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quantiser,
                               const glm::vec3& origin, const format::BasisTables& tables);

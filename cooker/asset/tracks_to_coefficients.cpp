@@ -239,11 +239,6 @@ Attempt Fitter::attempt_point(const Basis& basis) const {
     track.flags =
         uint8_t(samples.flags | (fine ? format::track_fine : 0) | (basis.cosine ? format::track_cosine : 0));
     track.drop = false;
-    for (int c = 0; c < 2 && steps.slip_step > 0; ++c) {
-        const double slip = glm::dot(dvec3(samples.slip), tangents[c]) / steps.slip_step;
-        if (!std::isfinite(slip)) throw InputError("track: a slip is not finite");
-        track.slip[c] = int32_t(std::lround(std::clamp(slip, -double(format::max_slip), double(format::max_slip))));
-    }
     track.position = flattened(motion);
     track.second = flattened(normals);
     return out;
@@ -363,6 +358,7 @@ QuantisedTrack quantise_track(const TrackSamples& track, const Quantiser& quanti
         if (plain.cost < best.cost + handicap) best = std::move(plain);
     }
     best.track.birth = track.birth, best.track.death = track.death;
+    set_slip(best.track, track.slip, quantiser, origin);
     return std::move(best.track);
 }
 
@@ -372,6 +368,18 @@ float rough_bits(const QuantisedTrack& track) {
     for (size_t i = 3; i < track.position.size(); ++i) bits += cost_of(track.position[i]);
     for (size_t i = track.drop ? 6 : 3; i < track.second.size(); ++i) bits += cost_of(track.second[i]);
     return float(bits);
+}
+
+void set_slip(QuantisedTrack& track, const glm::vec3& slip, const Quantiser& quantiser, const glm::vec3& origin) {
+    const format::LatticeSteps steps = lattice_steps(quantiser, origin);
+    if (track.drop || !(steps.slip_step > 0)) return;
+    const FrameAxes axes = axes_of(track.axis, format::axis_levels(steps, track.death - track.birth + 1u));
+    const dvec3 tangents[2] = {axes.t1, axes.t2};
+    for (int c = 0; c < 2; ++c) {
+        const double along = glm::dot(dvec3(slip), tangents[c]) / steps.slip_step;
+        if (!std::isfinite(along)) throw InputError("track: a slip is not finite");
+        track.slip[c] = int32_t(std::lround(std::clamp(along, -double(format::max_slip), double(format::max_slip))));
+    }
 }
 
 TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quantiser,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cook/cook.h"
 
+#include <nlohmann/json.hpp>
+
 #include <cstdio>
 #include <filesystem>
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "verify/verify.h"
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <cstdio>
 

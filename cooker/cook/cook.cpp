@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cook/cook.h"
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

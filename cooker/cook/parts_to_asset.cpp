@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cook/parts_to_asset.h"
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -234,9 +234,9 @@ Window SpanCook::next_window(uint32_t first, uint32_t span_end, const Past& past
     Window window;
     window.first = int(first);
     load(window, plan_.window_end(first, span_end), past, tolerance);
+    window.slips = velocity_known && settings_.slip;
     window.calm = velocity_known && go_with_liquid(window, settings_.jobs);
     if (!window.calm) {
-        window.slips = velocity_known && settings_.slip;
         go_with_surface(window, past, settings_.jobs);
         return window;
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cook/survey.h"
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -21,13 +23,15 @@ constexpr size_t measured = 16;  // and whose edges between walls are
 
 struct FrameFacts {
     WallFacts walls;
+    RimOfPatch rim;
     float edge = 0;
     size_t triangles = 0, vertices = 0;
 };
 
 FrameFacts facts_of(const Mesh& mesh) {
     const float edge = median_edge(mesh);
-    return {wall_facts(mesh, edge), edge, mesh.triangles.size(), mesh.positions.size()};
+    const WallFacts walls = wall_facts(mesh, edge);
+    return {walls, rim_of_patch(mesh, walls.lower, walls.upper), edge, mesh.triangles.size(), mesh.positions.size()};
 }
 
 /// Frames that the liquid is in, evenly spread.
@@ -74,7 +78,8 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         open[k] = open_edges(mesh).size();
     });
     if (std::any_of(added.begin(), added.end(), [](size_t n) { return n > 0; }))
-        warn(reader.info().path + ": the liquid is cut off at sides of its bounds: closed there, flat");
+        warn(reader.info().path + (cut.moving ? ": the rim of the liquid moves sideways: it is carried on to its bounds, and closed there, flat"
+                                              : ": the liquid is cut off at sides of its bounds: closed there, flat"));
     char text[300];
     for (size_t k = 0; k < looks; ++k) {
         if (open[k] == 0) continue;
@@ -108,7 +113,7 @@ Survey from_json(const json& j) {
 json kept_survey(const std::string& file, const std::string& states, const ReadOptions& options) {
     if (file.empty() || !std::filesystem::exists(file)) return nullptr;
     json kept = json::parse(read_file(file), nullptr, false);
-    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 6) return nullptr;
+    if (!kept.is_object() || kept.value("report", json()) != "rill survey" || kept.value("version", json()) != 7) return nullptr;
     const bool same = kept.value("tool", json()) == RILL_VERSION && kept.value("states", json()) == states && kept.value("read", json()) == read_settings(options);
     return same ? kept : json(nullptr);
 }
@@ -151,7 +156,9 @@ Survey look_at_all(const SequenceReader& reader, int jobs, const std::function<v
     std::vector<FrameFacts> facts = look_at_frames(reader, result.cut, jobs, progress);
     float edge = median_of_edges(facts);
     if (edge == 0) return result;
-    result.cut = find_cut(walls_of(facts, edge), edge);
+    RimOfPatch rim;
+    for (const FrameFacts& f : facts) rim.add(f.rim);
+    result.cut = find_cut(walls_of(facts, edge), rim, edge);
     if (result.cut.sides) facts = look_at_frames(reader, result.cut, jobs, progress), edge = median_of_edges(facts);
     for (const FrameFacts& f : facts) result.triangles += double(f.triangles), result.vertices += double(f.vertices);
     const WallFacts walls = walls_of(facts, edge);
@@ -196,7 +203,7 @@ Survey survey_input(const SequenceReader& reader, const ReadOptions& options, co
     Survey result = look_at_all(reader, jobs, options.warn, progress);
     result.fit = fit, result.input = input;
     if (!file.empty()) {
-        const json kept = {{"report", "rill survey"}, {"version", 6}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
+        const json kept = {{"report", "rill survey"}, {"version", 7}, {"tool", RILL_VERSION}, {"states", states}, {"read", read_settings(options)},
                            {"input", input}, {"facts", to_json(result)}};
         write_file(file, kept.dump(2) + "\n");
     }

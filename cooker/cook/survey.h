@@ -4,7 +4,7 @@
 #pragma once
 #include <functional>
 #include <glm/glm.hpp>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "frames/check_velocity.h"

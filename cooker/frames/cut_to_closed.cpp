@@ -5,6 +5,8 @@
 // edge they share. Inside of the outlines there is liquid.
 #include "frames/cut_to_closed.h"
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +21,7 @@ namespace {
 
 constexpr float pitch_edges = 1;    // as the source: its median edge stays what it is
 constexpr float most_parts = 2048;  // of an edge of the box
+constexpr double still_share = 0.98; // of the rim that faces a side: lies in it where it does not move
 constexpr float room_edges = 10;    // a patch reaches some six edges down from the waves
 
 /// Of a side, facing outward.
@@ -232,9 +235,11 @@ private:
 
 }  // namespace
 
-Cut find_cut(const WallFacts& facts, float edge) {
+Cut find_cut(const WallFacts& facts, const RimOfPatch& rim, float edge) {
     Cut cut;
     for (int s = 0; s < 6; ++s) cut.sides |= uint32_t(facts.open[s] > 0) << s;
+    for (int s = 0; s < 4; ++s) cut.moving |= rim.sides() & uint32_t(facts.open[s] < still_share * rim.facing[s]) << s;
+    if (cut.moving) cut.sides = rim.sides();  // whatever of its crests and troughs lies in other bounds
     cut.lower = facts.lower, cut.upper = facts.upper, cut.edge = edge;
     for (int a = 0; a < 3; ++a) {
         if (!(cut.sides >> 2 * a & 1)) cut.lower[a] -= room_edges * edge;
@@ -255,16 +260,19 @@ uint32_t closed_sides(const Cut& cut, const glm::vec3& lower, const glm::vec3& u
 void close_at_sides(Mesh& mesh, const Cut& cut) {
     if (!cut.sides || mesh.triangles.empty()) return;
     mesh.normals.clear();
+    if (cut.moving) widen_to_sides(mesh, cut.moving, cut.lower, cut.upper, cut.within());
     Closing(mesh, cut);
 }
 
 nlohmann::json cut_json(const Cut& cut) {
-    return {{"sides", cut.sides}, {"lower", {cut.lower.x, cut.lower.y, cut.lower.z}}, {"upper", {cut.upper.x, cut.upper.y, cut.upper.z}}, {"edge", cut.edge}};
+    nlohmann::json json = {{"sides", cut.sides}, {"lower", {cut.lower.x, cut.lower.y, cut.lower.z}}, {"upper", {cut.upper.x, cut.upper.y, cut.upper.z}}, {"edge", cut.edge}};
+    if (cut.moving) json["moving"] = cut.moving;
+    return json;
 }
 
 Cut cut_from_json(const nlohmann::json& json) {
     Cut cut;
-    cut.sides = json.at("sides"), cut.edge = json.at("edge");
+    cut.sides = json.at("sides"), cut.edge = json.at("edge"), cut.moving = json.value("moving", 0u);
     bool is_box = cut.edge > 0;
     for (int a = 0; a < 3; ++a) {
         cut.lower[a] = json.at("lower").at(size_t(a)), cut.upper[a] = json.at("upper").at(size_t(a));

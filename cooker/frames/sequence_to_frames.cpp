@@ -8,6 +8,7 @@
 #include "frames/turn_alike.h"
 #include "frames/walls.h"
 #include "frames/weld_seams.h"
+#include "frames/widen_patch.h"
 
 namespace rill::cooker {
 namespace {
@@ -75,10 +76,14 @@ std::vector<size_t> select(const SequenceInfo& info, const ReadOptions& options)
 }
 
 /// Where liquid is cut off at sides of its bounds, what is missing lies in them: seen from where these meet it has no volume, and from between
-/// two of them it adds some. Waves without a floor lie above their lowest point.
+/// two of them it adds some. Waves without a floor lie above their lowest point; liquid is below a patch of them.
 bool faces_inward(const Mesh& mesh) {
     if (mesh.triangles.empty() || open_edges(mesh).empty()) return signed_volume(mesh) < 0;
     const WallFacts facts = wall_facts(mesh, median_edge(mesh));
+    Mesh turned = mesh;
+    for (Triangle& t : turned.triangles) std::swap(t[1], t[2]);
+    for (const Mesh* either : {&mesh, static_cast<const Mesh*>(&turned)})
+        if (rim_of_patch(*either, facts.lower, facts.upper).sides()) return either == &turned;
     glm::vec3 apex;
     for (int a = 0; a < 3; ++a) {
         const bool lower = facts.open[2 * a] > 0, upper = facts.open[2 * a + 1] > 0;

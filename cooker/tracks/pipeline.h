@@ -58,7 +58,7 @@ struct Window {
     std::vector<std::shared_ptr<const SurfaceFrame>> frames;
     std::vector<std::vector<glm::vec3>> motion;  ///< of every vertex of frames[s] onto frames[s + 1], metres
     bool calm = false;                   ///< `motion` is the liquid's own
-    bool slips = false;                  ///< the liquid goes another way than `motion`, along the surface: slip is kept
+    bool slips = false;                  ///< slip is kept where the points, as coded, go another way along the surface than the liquid
     std::vector<double> seconds;
     std::vector<SurfacePoint> before;    ///< what the window before decodes to in the frame that both have, sample 0; none if it opens a span
     std::vector<Path> paths;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `rill verify --html`: everything in one file, nothing fetched, readable in print.
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The report of `rill verify`, as cooker/REPORTS.md describes it.
+#include <nlohmann/json.hpp>
+
 #include <cmath>
 
 #include "verify/verify.h"

@@ -16,12 +16,6 @@ namespace {
 
 constexpr float trusted_cells = 0.25f;    // patches and their crossings: farther apart, the patches may be wrong
 
-uint32_t corner_signs(const Tile& tile, uint32_t cell) {
-    const uint32_t x = cell % 8, row = cell / 8 % 8 + 9 * (cell / 64);
-    const auto pair = [&](uint32_t r) { return uint32_t(tile.inside[r]) >> x & 3; };
-    return pair(row) | pair(row + 1) << 2 | pair(row + 9) << 4 | pair(row + 10) << 6;
-}
-
 /// Faces of a cell that its smaller neighbours have turned.
 uint32_t turned_faces(const Tile& tile, uint32_t cell) {
     if (!(tile.beside & every_finer)) return 0;
@@ -149,9 +143,11 @@ struct Placing {
     /// At the mean of its crossings, whose shares are `share`; without any, in the middle. `corner`: the cell's, in cells; `all`: its crossings.
     void append_patch(uint32_t cell, const CellPatches& patches, uint32_t patch, const EdgeSums& sums, const float* share, const float (&corner)[3], const CellCrossings& all) {
         float* out[3] = {s.x + n, s.y + n, s.z + n};
+        float start[3];
+        const bool is_cut = walls.sharp && start_at_sharp_rim(walls, patches, patch, all, corner, start);
         for (uint32_t a = 0; a < 3; ++a) {
             const float along = share[4 * a] + share[4 * a + 1] + share[4 * a + 2] + share[4 * a + 3];
-            const float place = sums.count > 0 ? (along + sums.lower[a]) / sums.count : 0.5f;
+            const float mean = sums.count > 0 ? (along + sums.lower[a]) / sums.count : 0.5f, place = is_cut ? start[a] : mean;
             // (std::clamp becomes branches.)
             const float above = place > cell_margin ? place : cell_margin, within = above < 1 - cell_margin ? above : 1 - cell_margin;
             *out[a] = (corner[a] + within) * tile.cell;

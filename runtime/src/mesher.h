@@ -67,6 +67,12 @@ inline uint8_t surface_cells(const Tile& tile, uint32_t row) {
     const uint16_t* c = tile.inside + row % 8 + 9 * (row / 8);
     return uint8_t(mixed(c[0] | c[1] | c[9] | c[10], c[0] & c[1] & c[9] & c[10]));
 }
+/// Of a cell, numbered x + 8 (y + 8 z): which of its corners, x + 2 y + 4 z, are inside.
+inline uint32_t corner_signs(const Tile& tile, uint32_t cell) {
+    const uint32_t x = cell % 8, row = cell / 8 % 8 + 9 * (cell / 64);
+    const auto pair = [&](uint32_t r) { return uint32_t(tile.inside[r]) >> x & 3; };
+    return pair(row) | pair(row + 1) << 2 | pair(row + 9) << 4 | pair(row + 10) << 6;
+}
 
 /// A vertex on its way to the target.
 struct Vertex {
@@ -287,10 +293,14 @@ struct CellCrossings {
 inline constexpr uint32_t meets_free = 1u << 6, nears_wall = 1u << 7, nears_edge = 1u << 8;
 /// The walls that come near to a tile.
 struct NearWalls {
-    uint32_t sides;            ///< bits
+    uint32_t sides, sharp;     ///< bits; of those, the sharp ones
     float reach, place[6];     ///< as near as that; where they are. In cells
 };
 NearWalls walls_near(const Mesher& m, const Tile& tile) noexcept;
+/// Where the vertex of a patch begins that a sharp wall cuts: the mean of its crossings that lie in no wall, in cells from the lower corner.
+/// That of all lies inside the liquid, where the field has no slope to tell the rim from. False where there are none.
+bool start_at_sharp_rim(const NearWalls& walls, const CellPatches& patches, uint32_t patch, const CellCrossings& crossings, const float (&corner)[3],
+                        float (&start)[3]) noexcept;
 /// What a patch of a cell meets and is near to, of those. `corner`: of the cell, in cells.
 uint32_t walls_met(const NearWalls& walls, const CellPatches& patches, uint32_t patch, const CellCrossings& crossings,
                    const float (&corner)[3]) noexcept;
