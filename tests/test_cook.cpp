@@ -340,6 +340,21 @@ TEST_CASE("a single frame, and windows of a single frame") {
     for (uint32_t i = 0; i < 4; ++i) CHECK(distance(of_frame(int(i)), player.mesh(i / fps)).p99 < 1.5 * many.report.target_p99);
 }
 
+TEST_CASE("shells that overlap are warned of, and no others") {
+    for (const float apart : {0.7f, 1.2f}) {
+        std::string warnings;
+        Cooked cooked([apart](int) {
+            Mesh mesh = sphere(16, 0.5f), other = sphere(16, 0.5f, {apart, 0, 0});
+            append(mesh, other);
+            return mesh;
+        }, 1);
+        cooked.settings.error = "1e", cooked.settings.read.require_velocity = false;
+        cooked.settings.read.warn = [&](const std::string& text) { warnings += text; };
+        cooked.cook();
+        CHECK((warnings.find("inside other liquid") != std::string::npos) == (apart < 1));
+    }
+}
+
 TEST_CASE("windows are longer where the liquid is calm, unless it is told how long") {
     const auto calm = [](int i) {
         Mesh mesh = torus(24, 12, 0.5f, 0.2f);

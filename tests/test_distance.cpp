@@ -8,6 +8,7 @@
 #include <random>
 
 #include "cook/error_target.h"
+#include "measure/overlap.h"
 #include "measure/surface_distance.h"
 #include "shapes.h"
 
@@ -231,6 +232,24 @@ TEST_CASE("small measures of a mesh") {
     Mesh unused = flat;
     unused.positions.push_back({5, 5, 5});
     CHECK(vertex_normals(unused).back() == glm::vec3(0));
+}
+
+TEST_CASE("shells that overlap: the share of them that lies in the other") {
+    const auto two = [](float apart, float radius) {
+        Mesh mesh = sphere(48, 1), other = sphere(48, radius, {apart, 0, 0});
+        append(mesh, other);
+        return mesh;
+    };
+    const auto inside = [](const Mesh& mesh) { return share_inside(mesh, median_edge(mesh)); };
+    CHECK(inside(sphere(48, 1)) == 0);
+    CHECK(inside(two(3, 1)) == 0);
+    CHECK(inside(two(2.002f, 1)) == 0);  // a hair apart
+    for (const float apart : {0.5f, 1.f, 1.5f}) CHECK(inside(two(apart, 1)) == doctest::Approx((2 - apart) / 4).epsilon(0.1));
+    Mesh bubble = sphere(48, 0.5f), ball = sphere(48, 1);
+    for (Triangle& t : bubble.triangles) std::swap(t[1], t[2]);
+    append(ball, bubble);
+    CHECK(inside(ball) == 0);
+    CHECK(inside(Mesh{}) == 0);
 }
 
 TEST_CASE("what --error says, in metres") {

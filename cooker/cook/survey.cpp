@@ -12,6 +12,7 @@
 #include "common/parallel.h"
 #include "cook/input_hash.h"
 #include "frames/walls.h"
+#include "measure/overlap.h"
 #include "readers/file_bytes.h"
 
 namespace rill::cooker {
@@ -19,6 +20,7 @@ namespace {
 using nlohmann::json;
 
 constexpr size_t looked_at = 6;  // frames whose topology is looked at
+constexpr double much_inside = 0.03;  // of a surface, inside other liquid: noise of solvers and meshers has less
 constexpr size_t measured = 16;  // and whose edges between walls are
 
 struct FrameFacts {
@@ -70,12 +72,14 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
     const std::vector<size_t> samples = samples_of(facts, looked_at);
     const size_t looks = samples.size();
     std::vector<size_t> added(looks, 0), open(looks, 0);
+    std::vector<double> inside(looks, 0);
     parallel_for(looks, jobs, [&](size_t k) {
         Mesh mesh = reader.read_surface(samples[k]);
         const size_t before = mesh.triangles.size();
         close_at_sides(mesh, cut);
         added[k] = mesh.triangles.size() - before;
         open[k] = open_edges(mesh).size();
+        if (open[k] == 0) inside[k] = share_inside(mesh, median_edge(mesh));
     });
     if (std::any_of(added.begin(), added.end(), [](size_t n) { return n > 0; }))
         warn(reader.info().path + (cut.moving ? ": the rim of the liquid moves sideways: it is carried on to its bounds, and closed there, flat"
@@ -85,6 +89,13 @@ void inspect(const SequenceReader& reader, const std::vector<FrameFacts>& facts,
         if (open[k] == 0) continue;
         std::snprintf(text, sizeof text, ": the mesh is open (%zu open edges): the decoded surface is closed, so holes are covered; "
                       "export the whole liquid, with the sides of the domain capped", open[k]);
+        warn(reader.name(samples[k]) + text);
+        break;
+    }
+    for (size_t k = 0; k < looks; ++k) {
+        if (inside[k] < much_inside) continue;
+        std::snprintf(text, sizeof text, ": %.0f %% of the surface lies inside other liquid: shells that overlap decode badly; unite them before the export",
+                      100 * inside[k]);
         warn(reader.name(samples[k]) + text);
         break;
     }
