@@ -212,15 +212,12 @@ TEST_CASE("a patch of waves whose rim moves sideways is carried on to its bounds
         }
         CHECK(moving > 150);
     }
-    // A sea with a hole in it is no such patch, nor is one that is open on three sides only.
-    for (const bool middle : {true, false}) {
-        Mesh torn = frames[0];
-        if (middle)
-            torn.triangles.erase(torn.triangles.begin() + 2000, torn.triangles.begin() + 2040);
-        else
-            torn = cut_off(torn, 0, true, 0.05f), torn.positions.push_back({-1, 0, 0}), torn.triangles.push_back({uint32_t(torn.positions.size() - 1), 0, 1}), torn.velocities.emplace_back(0);
-        CHECK(cut_of(torn).moving == 0);
-    }
+    // A sea with a hole in it is no such patch, nor with another open surface beside it, nor one that faces down.
+    Mesh holed = frames[0], joined = frames[0], turned = frames[0];
+    holed.triangles.erase(holed.triangles.begin() + 2000, holed.triangles.begin() + 2040);
+    append(joined, cut_off(sphere(16, 0.2f, {1, 1, 1}), 2, true, 1));
+    turn(turned);
+    for (const Mesh& other : {holed, joined, turned}) CHECK(cut_of(other).moving == 0);
 }
 
 TEST_CASE("liquid in the domain's corner takes the corner in") {
@@ -369,6 +366,7 @@ TEST_CASE("slow rolling waves: cooked as well, with the velocity that the coded 
         }
         degrees[slip] = result.velocity.degrees.mean();
     }
+    CAPTURE(degrees[0]);
     CHECK(degrees[1] < 0.75 * degrees[0]);
 }
 

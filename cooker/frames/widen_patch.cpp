@@ -21,9 +21,9 @@ struct Bounds {
 };
 
 /// The vertices of the one rim that a patch has, counter-clockwise from above; none if there is another, or it crosses itself.
-std::vector<uint32_t> rim_of(const Mesh& mesh) {
+std::vector<uint32_t> rim_of(const std::vector<OpenEdge>& open) {
     std::map<uint32_t, uint32_t> next;
-    for (const OpenEdge& e : open_edges(mesh))
+    for (const OpenEdge& e : open)
         if (!next.emplace(e.from, e.to).second) return {};
     std::vector<uint32_t> rim;
     for (auto at = next.begin(); at != next.end() && rim.size() < next.size(); at = next.find(at->second)) {
@@ -59,7 +59,7 @@ std::vector<int> sides_along(const Mesh& mesh, const std::vector<uint32_t>& rim,
 class Widening {
 public:
     Widening(Mesh& mesh, uint32_t moving, const Bounds& bounds, float within) : mesh_(mesh), bounds_(bounds), within_(within) {
-        const std::vector<uint32_t> rim = rim_of(mesh);
+        const std::vector<uint32_t> rim = rim_of(open_edges(mesh));
         const std::vector<int> sides = sides_along(mesh, rim, bounds);
         for (size_t i = 0; i < sides.size(); ++i) {
             if (!(moving >> sides[i] & 1)) continue;
@@ -118,7 +118,8 @@ uint32_t RimOfPatch::sides() const {
 RimOfPatch rim_of_patch(const Mesh& mesh, const glm::vec3& lower, const glm::vec3& upper) {
     RimOfPatch found;
     const Bounds bounds{lower, upper};
-    const std::vector<uint32_t> rim = rim_of(mesh);
+    const std::vector<OpenEdge> open = open_edges(mesh);
+    const std::vector<uint32_t> rim = rim_of(open);
     const std::vector<int> sides = sides_along(mesh, rim, bounds);
     for (size_t i = 0; i < sides.size(); ++i) {
         const glm::vec3 from = mesh.positions[rim[i]], to = mesh.positions[rim[(i + 1) % rim.size()]];
@@ -126,7 +127,7 @@ RimOfPatch rim_of_patch(const Mesh& mesh, const glm::vec3& lower, const glm::vec
         (is_near ? found.facing[sides[i]] : found.others) += glm::distance(from, to);
     }
     if (sides.empty())
-        for (const OpenEdge& e : open_edges(mesh)) found.others += glm::distance(mesh.positions[e.from], mesh.positions[e.to]);
+        for (const OpenEdge& e : open) found.others += glm::distance(mesh.positions[e.from], mesh.positions[e.to]);
     return found;
 }
 
