@@ -35,6 +35,7 @@ TrackSamples make_track(std::mt19937& random, uint32_t birth, uint32_t death, bo
     if (death < window - 1) track.flags |= format::track_dies;
     const glm::vec2 start(unit(random), unit(random));
     track.slip = {0.4f * start.y + 0.1f * unit(random), -0.4f * start.x, 0.1f * unit(random)};  // a vortex
+    track.slip_change = {0.3f * start.x, 0.2f * start.y + 0.1f * unit(random), 0};  // that speeds up here, slows down there
     const float flip = random() % 4 == 0 ? -1.f : 1.f;  // floors face down
     for (uint32_t s = birth; s <= death; ++s) {
         const float t = s / 24.f * violence;
@@ -89,7 +90,7 @@ std::vector<float> numbers(const format::Track& t, const float* coefficients, bo
     std::vector<float> out = {float(drop),    float(t.birth),          float(t.death),
                               float(t.flags), float(t.position_terms), float(t.second_terms)};
     const float* at = coefficients + t.first_coefficient;
-    if (!drop) out.insert(out.end(), t.slip, t.slip + 3);
+    if (!drop) out.insert(out.end(), t.slip, t.slip + 3), out.insert(out.end(), t.slip_change, t.slip_change + 3);
     out.insert(out.end(), at, at + t.position_terms * 3 + t.second_terms * (drop ? 6 : 3));
     return out;
 }
@@ -116,7 +117,7 @@ std::vector<std::vector<float>> expected_numbers(const std::vector<QuantisedTrac
         raw.second_terms = uint8_t(q.second.size() / channels);
         std::copy(q.lattice, q.lattice + 3, raw.lattice);
         std::copy(q.axis, q.axis + 2, raw.axis);
-        std::copy(q.slip, q.slip + 2, raw.slip);
+        std::copy(q.slip, q.slip + 2, raw.slip), std::copy(q.slip_change, q.slip_change + 2, raw.slip_change);
         for (size_t i = 0; i < q.position.size(); ++i) raw.position[i / 3][i % 3] = q.position[i];
         for (size_t i = 0; i < q.second.size(); ++i) raw.second[i / channels][i % channels] = q.second[i];
         std::vector<float> memory(q.position.size() + q.second.size());
@@ -410,6 +411,8 @@ TEST_CASE("slip: along the surface, within its step; cheaper where neighbours sa
         n = glm::normalize(n);
         const glm::vec3 along = track.slip - n * glm::dot(track.slip, n);
         CHECK(glm::distance(back.slip, along) < quantiser.slip_step);
+        const glm::vec3 change = track.slip_change - n * glm::dot(track.slip_change, n);
+        CHECK(glm::distance(back.slip_change, change) < quantiser.slip_step);
         CHECK(std::abs(glm::dot(back.slip, n)) < 0.5f * quantiser.slip_step);
         without.push_back(quantise_track(track, none, origin, tables()));
         CHECK(dequantise_track(without.back(), none, origin, tables()).slip == glm::vec3(0));
@@ -427,6 +430,44 @@ TEST_CASE("slip: along the surface, within its step; cheaper where neighbours sa
     CHECK(encode({clamped}).shape.point_count == 1);
     wild.slip.x = NAN;
     CHECK_THROWS_AS(quantise_track(wild, quantiser, origin, tables()), InputError);
+    wild.slip.x = 0, wild.slip_change.y = NAN;
+    CHECK_THROWS_AS(quantise_track(wild, quantiser, origin, tables()), InputError);
+}
+
+TEST_CASE("change of slip: not of brief lives; cheaper where neighbours say the same, whatever their lives; none before version 8") {
+    std::mt19937 random(5);
+    std::vector<QuantisedTrack> lines, noisy, steady;
+    const auto add = [&](std::vector<QuantisedTrack>& to, const TrackSamples& track) {
+        to.push_back(quantise_track(track, quantiser, origin, tables()));
+    };
+    for (int i = 0; i < 600; ++i) {
+        const uint32_t birth = random() % 8, death = window - 1 - random() % 8;
+        TrackSamples track = make_track(random, birth, death, false);
+        // One acceleration for all: of brief and long lives, at any time.
+        const float middle = 0.5f * float(birth + death), half = 0.5f * float(death - birth);
+        track.slip = glm::vec3(0.04f * middle, 0, 0), track.slip_change = glm::vec3(0.04f * half, 0, 0);
+        add(lines, track);
+        track.slip_change = glm::vec3(float(random() % 1000), float(random() % 1000), 0) / 1000.f - 0.5f;
+        add(noisy, track);
+        track.slip_change = glm::vec3(0);
+        add(steady, track);
+    }
+    const double bits = encode(lines).bits.slip;
+    CHECK(bits < 0.5 * encode(noisy).bits.slip);
+    CHECK(bits < encode(steady).bits.slip);  // told that they stand, the same slips at different times are no line
+    for (const uint32_t life : {1u, format::least_changing_life - 1, format::least_changing_life}) {
+        TrackSamples track = make_track(random, 3, 2 + life, false);
+        track.slip_change = glm::vec3(1, 1, 0);
+        const QuantisedTrack coded = quantise_track(track, quantiser, origin, tables());
+        CHECK((coded.slip_change[0] != 0 || coded.slip_change[1] != 0) == (life == format::least_changing_life));
+    }
+    // What a file of version 7 says, is read as it was meant: the steps tell.
+    format::Header header{};
+    format::WindowRecord record{};
+    header.version = format::version_7;
+    CHECK(!steps_of(header, record).slip_changes);
+    header.version = format::version_8;
+    CHECK(steps_of(header, record).slip_changes);
 }
 
 TEST_CASE("slip left to the neighbours: fewer bits, and no more than two steps off") {
@@ -447,7 +488,7 @@ TEST_CASE("slip left to the neighbours: fewer bits, and no more than two steps o
     REQUIRE(d.status == Status::ok);
     // Nothing but slip has changed: what else a track is, tells which one it was.
     const auto slip_of = [](const std::vector<float>& n) { return glm::vec3(n[6], n[7], n[8]); };
-    const auto rest_of = [](std::vector<float> n) { return n.erase(n.begin() + 6, n.begin() + 9), n; };
+    const auto rest_of = [](std::vector<float> n) { return n.erase(n.begin() + 6, n.begin() + 9), n; };  // their change is told by each
     std::multimap<std::vector<float>, glm::vec3> meant;
     for (const auto& n : expected_numbers(tracks)) meant.emplace(rest_of(n), slip_of(n));
     size_t own = 0;
@@ -587,13 +628,18 @@ TEST_CASE("evaluation gives the decoded samples, activity ramps, and exact veloc
     }
     CHECK(evaluate(19.5, 4, points) == 2);
     CHECK(evaluate(20.5, 4, points) == 2);
-    evaluate(12.0, 4, points);
-    const glm::vec3 x(points.x[0], points.y[0], points.z[0]), v(points.vx[0], points.vy[0], points.vz[0]);
-    evaluate(12.05, 4, points);
-    const glm::vec3 later(points.x[0], points.y[0], points.z[0]);
-    // The velocity is that of the point, as finite differences tell it, and its slip.
-    const TrackSamples& track = glm::distance(truth[0].position[12], x) < 1e-5f ? truth[0] : truth[3];
-    CHECK(glm::length((later - x) / (0.05f / 24) + track.slip - v) < 0.02f);
-    CHECK(glm::length(track.slip) > 0.1f);
+    // The velocity is that of the point, as finite differences tell it, and its slip, which goes as a line over its life.
+    for (const uint32_t sample : {2u, 12u, window - 2}) {
+        CAPTURE(sample);
+        evaluate(sample, 4, points);
+        const glm::vec3 x(points.x[0], points.y[0], points.z[0]), v(points.vx[0], points.vy[0], points.vz[0]);
+        evaluate(sample + 0.05, 4, points);
+        const glm::vec3 later(points.x[0], points.y[0], points.z[0]);
+        const TrackSamples& track = glm::distance(truth[0].position[sample], x) < 1e-5f ? truth[0] : truth[3];
+        const float place = 2.f * float(sample) / float(window - 1) - 1;
+        CHECK(glm::length((later - x) / (0.05f / 24) + track.slip + place * track.slip_change - v) < 0.02f);
+        CHECK(glm::length(track.slip) > 0.1f);
+        CHECK(glm::length(track.slip_change) > 0.1f);
+    }
     CHECK(std::abs(glm::length(glm::vec3(points.nx[0], points.ny[0], points.nz[0])) - 1) < 1e-5f);
 }

@@ -256,6 +256,31 @@ TEST_CASE("liquid that streams along a surface that stands: the points stay, and
     CHECK(wrong < 0.4 * all);  // steps of slip are a third of the speed; without slip all of it is missing
 }
 
+TEST_CASE("liquid that streams faster and faster along a surface that stands") {
+    const auto along = [](const glm::vec3& x, int frame) {
+        const glm::vec3 n = glm::normalize(x);
+        return (2.f + float(frame)) * (glm::vec3(0, 0, 1) - n * n.z);
+    };
+    Cooked cooked([&](int frame) {
+        Mesh mesh = sphere(32, 0.5f);
+        for (const glm::vec3& x : mesh.positions) mesh.velocities.push_back(along(x, frame));
+        return mesh;
+    });
+    cooked.settings.window = 7;
+    cooked.cook();
+    AssetPlayer player(cooked.asset);
+    for (const int frame : {1, 4, 7}) {
+        const Mesh mesh = player.mesh(frame / fps);
+        double shown = 0, true_speed = 0;
+        for (size_t i = 0; i < mesh.positions.size(); ++i) {
+            const glm::vec3 truth = along(mesh.positions[i], frame);
+            shown += glm::dot(mesh.velocities[i], truth), true_speed += glm::dot(truth, truth);
+        }
+        CAPTURE(frame);
+        CHECK(shown == doctest::Approx(true_speed).epsilon(0.4));  // a slip that stays: 1.8 times as fast as it is, .5 times at last
+    }
+}
+
 TEST_CASE("closed at cells of 1, 2 and 4 times the source's, and coarser with each") {
     AssetPlayer player(whole().asset);
     const float cell = player.info().cell_size;

@@ -227,6 +227,26 @@ TEST_CASE("an interrupted cook goes on from its finished spans; damaged ones are
     CHECK(clip.files() == 2);  // input and asset: what was kept is gone
 }
 
+TEST_CASE("of two cooks of one output the second is told of the first, which goes on") {
+    Clip clip;
+    std::string same, other;
+    uint32_t calls = 0;
+    clip.cook(clip.asset, [&](const CookProgress& p) {
+        if (p.stage != "cooking" || calls++) return;
+        same = message_of([&] { clip.cook(clip.asset); });
+        Clip with_other_settings;
+        with_other_settings.settings.error = "0.3e";
+        other = message_of([&] { with_other_settings.cook(clip.asset); });
+    });
+    CHECK(has(same, "out.rill: another cook is writing it"));
+    CHECK(other == same);
+    CHECK(get_file(clip.asset) == whole());
+    CHECK(clip.files() == 2);
+    clip.settings.force = true;
+    clip.cook(clip.asset);  // when it is done, others may
+    CHECK(get_file(clip.asset) == whole());
+}
+
 TEST_CASE("what is there already is not cooked again: same input, settings and tool") {
     Clip clip;
     put_file(clip.asset, whole());

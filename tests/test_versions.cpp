@@ -13,7 +13,8 @@ namespace cooker = rill::cooker;
 
 namespace {
 
-constexpr uint32_t versions[] = {rill::format::version_4, rill::format::version_5, rill::format::version_6, rill::format::version_7};
+constexpr uint32_t versions[] = {rill::format::version_4, rill::format::version_5, rill::format::version_6, rill::format::version_7,
+                                 rill::format::version_8};
 constexpr uint32_t refused[] = {rill::format::version_1, rill::format::version_2, rill::format::version_3};
 
 std::string golden(uint32_t version, const char* ending) {

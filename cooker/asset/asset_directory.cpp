@@ -73,6 +73,7 @@ AssetDirectory read_directory(const std::string& path) {
     std::ifstream file(path, std::ios::binary | std::ios::ate);
     const std::streamoff size = file.tellg();
     if (!file || size < 0) throw InputError(path + ": cannot be read" + (errno ? ": " + std::string(std::strerror(errno)) : ""));
+    if (size == 0) throw InputError(path + ": not a .rill file: it is empty, as the parts of segments are that no span was left for");
     AssetDirectory result;
     result.path = path;
     const char* reason = "it ends early";

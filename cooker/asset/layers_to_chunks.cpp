@@ -43,7 +43,7 @@ bool stored_before(const RawTrack& a, const RawTrack& b) {
                                   t.second_terms, t.axis[0], t.axis[1]};
         for (uint32_t i = 0; i < t.position_terms; ++i) k.insert(k.end(), t.position[i], t.position[i] + 3);
         for (uint32_t i = 0; i < t.second_terms; ++i) k.insert(k.end(), t.second[i], t.second[i] + 6);
-        k.insert(k.end(), t.slip, t.slip + 2);
+        k.insert(k.end(), t.slip, t.slip + 2), k.insert(k.end(), t.slip_change, t.slip_change + 2);
         return k;
     };
     return key(a) < key(b);

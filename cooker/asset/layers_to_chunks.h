@@ -23,6 +23,7 @@ struct TrackSamples {
     std::vector<std::array<float, 6>> shape;   ///< drops: xx yy zz xy xz yz, metres
     glm::vec3 drift{};                         ///< drops of one sample: how far they go from that to the next, metres
     glm::vec3 slip{};                          ///< points: mean velocity of the liquid past the track, m/s; along the surface counts
+    glm::vec3 slip_change{};                   ///< likewise: how much faster at the end of its life than at the middle
 };
 struct Quantiser {
     float step;             ///< along the normal, metres: the lattice of what shows; decoded rms error ≈ .4 of it
@@ -42,7 +43,7 @@ struct QuantisedTrack {
     int32_t axis[2];                  ///< mean normal, octahedral (points)
     std::vector<int32_t> position;    ///< [term][t1, t2, n] in the frame of axis; drops: [term][xyz]
     std::vector<int32_t> second;      ///< normals [term][3] in that frame, or shape [term][6]
-    int32_t slip[2] = {0, 0};         ///< in that frame, in slip_step
+    int32_t slip[2] = {0, 0}, slip_change[2] = {0, 0};  ///< in that frame, in slip_step
 };
 /// Offset along `axis` (unit) that brings x at the given sample of life onto the source surface; NaN: cannot say.
 using ProjectAlong = std::function<float(uint32_t sample, const glm::vec3& x, const glm::vec3& axis)>;
@@ -54,8 +55,8 @@ using ProjectAlong = std::function<float(uint32_t sample, const glm::vec3& x, co
 QuantisedTrack quantise_track(const TrackSamples& track, const Quantiser& quantiser,
                               const glm::vec3& origin, const format::BasisTables& tables,
                               const ProjectAlong& project = {});
-/// Quantises the slip of a track of points anew, m/s; the rest stays.
-void set_slip(QuantisedTrack& track, const glm::vec3& slip, const Quantiser& quantiser, const glm::vec3& origin);
+/// Quantises slip and slip_change of a track of points anew; the rest stays.
+void set_slip(QuantisedTrack& track, const TrackSamples& samples, const Quantiser& quantiser, const glm::vec3& origin);
 /// What a decoder makes of the quantised track at its samples (normals unit).
 TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quantiser,
                               const glm::vec3& origin, const format::BasisTables& tables);

@@ -333,7 +333,7 @@ format::RawTrack raw_track(const QuantisedTrack& track) {
     raw.second_terms = uint8_t(track.second.size() / channels);
     std::copy(track.lattice, track.lattice + 3, raw.lattice);
     std::copy(track.axis, track.axis + 2, raw.axis);
-    std::copy(track.slip, track.slip + 2, raw.slip);
+    std::copy(track.slip, track.slip + 2, raw.slip), std::copy(track.slip_change, track.slip_change + 2, raw.slip_change);
     for (size_t i = 0; i < track.position.size(); ++i) raw.position[i / 3][i % 3] = track.position[i];
     for (size_t i = 0; i < track.second.size(); ++i) raw.second[i / channels][i % channels] = track.second[i];
     return raw;
@@ -358,7 +358,7 @@ QuantisedTrack quantise_track(const TrackSamples& track, const Quantiser& quanti
         if (plain.cost < best.cost + handicap) best = std::move(plain);
     }
     best.track.birth = track.birth, best.track.death = track.death;
-    set_slip(best.track, track.slip, quantiser, origin);
+    set_slip(best.track, track, quantiser, origin);
     return std::move(best.track);
 }
 
@@ -370,16 +370,21 @@ float rough_bits(const QuantisedTrack& track) {
     return float(bits);
 }
 
-void set_slip(QuantisedTrack& track, const glm::vec3& slip, const Quantiser& quantiser, const glm::vec3& origin) {
+void set_slip(QuantisedTrack& track, const TrackSamples& samples, const Quantiser& quantiser, const glm::vec3& origin) {
     const format::LatticeSteps steps = lattice_steps(quantiser, origin);
     if (track.drop || !(steps.slip_step > 0)) return;
-    const FrameAxes axes = axes_of(track.axis, format::axis_levels(steps, track.death - track.birth + 1u));
-    const dvec3 tangents[2] = {axes.t1, axes.t2};
-    for (int c = 0; c < 2; ++c) {
-        const double along = glm::dot(dvec3(slip), tangents[c]) / steps.slip_step;
-        if (!std::isfinite(along)) throw InputError("track: a slip is not finite");
-        track.slip[c] = int32_t(std::lround(std::clamp(along, -double(format::max_slip), double(format::max_slip))));
-    }
+    const uint32_t life = track.death - track.birth + 1u;
+    const FrameAxes axes = axes_of(track.axis, format::axis_levels(steps, life));
+    const auto set = [&](const glm::vec3& slip, int32_t (&out)[2]) {
+        const dvec3 tangents[2] = {axes.t1, axes.t2};
+        for (int c = 0; c < 2; ++c) {
+            const double along = glm::dot(dvec3(slip), tangents[c]) / steps.slip_step;
+            if (!std::isfinite(along)) throw InputError("track: a slip is not finite");
+            out[c] = int32_t(std::lround(std::clamp(along, -double(format::max_slip), double(format::max_slip))));
+        }
+    };
+    set(samples.slip, track.slip);
+    if (life >= format::least_changing_life) set(samples.slip_change, track.slip_change);
 }
 
 TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quantiser,
@@ -397,7 +402,8 @@ TrackSamples dequantise_track(const QuantisedTrack& track, const Quantiser& quan
     TrackSamples out;
     out.birth = track.birth, out.death = track.death, out.drop = track.drop;
     out.flags = record.flags & (format::track_born | format::track_dies);
-    for (int c = 0; c < 3 && !track.drop; ++c) out.slip[c] = block.slip_unit * float(record.slip[c]);
+    for (int c = 0; c < 3 && !track.drop; ++c)
+        out.slip[c] = block.slip_unit * float(record.slip[c]), out.slip_change[c] = block.slip_unit * float(record.slip_change[c]);
     const uint32_t life = track.death - track.birth + 1u, channels = track.drop ? 6 : 3;
     const uint32_t terms = std::max(record.position_terms, record.second_terms);
     const float* second = coefficients.data() + 3 * record.position_terms;

@@ -15,6 +15,7 @@
 #include "cook/parts_to_asset.h"
 #include "cook/span_to_part.h"
 #include "cook/survey.h"
+#include "cook/work_folder.h"
 #include "frames/open_sequence.h"
 
 namespace rill::cooker {
@@ -97,40 +98,6 @@ struct Job {
             return nullptr;
         }
     }
-};
-
-/// The folder of finished spans: gone when the cook is done, kept if there is anything in it when not.
-class WorkFolder {
-public:
-    WorkFolder(const std::string& output, std::string path, const std::function<void(const std::string&)>& warn)
-        : path_(std::move(path)), warn_(warn) {
-        std::error_code error;
-        fs::create_directory(path_, error);
-        if (error) throw InputError(output + ": cannot be written: " + error.message());
-    }
-    ~WorkFolder() {
-        std::error_code ignored;
-        fs::remove(path_, ignored);  // if it is empty
-        if (warn_ && fs::exists(path_, ignored)) warn_(path_ + ": keeps the finished spans; the same cook goes on from them");
-    }
-    /// Also what earlier cooks of this output have left, of other input or settings.
-    void remove_all(const std::string& output) const {
-        std::error_code ignored;
-        const fs::path target = fs::absolute(output, ignored);
-        const std::string prefix = target.filename().string() + ".cook-";
-        std::vector<fs::path> old;
-        for (fs::directory_iterator at(target.parent_path(), ignored), end; !ignored && at != end; at.increment(ignored)) {
-            const std::string name = at->path().filename().string();
-            if (name.size() == prefix.size() + 16 && name.compare(0, prefix.size(), prefix) == 0 &&
-                name.find_first_not_of("0123456789abcdef", prefix.size()) == std::string::npos)
-                old.push_back(at->path());
-        }
-        for (const fs::path& path : old) fs::remove_all(path, ignored);
-    }
-
-private:
-    std::string path_;
-    const std::function<void(const std::string&)>& warn_;
 };
 
 /// n frames last n times their mean distance, in seconds.
@@ -231,7 +198,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
     } else {
         report = report_of(link_asset(parts, output), false);
     }
-    folder.remove_all(output);
+    folder.remove_all();
     return report;
 }
 

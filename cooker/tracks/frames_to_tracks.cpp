@@ -304,13 +304,23 @@ std::vector<std::vector<Drop>> drops_of(const Window& window, const CodedWindow&
     return drops;
 }
 
-/// Velocity of the liquid past a track, which goes through these positions.
-glm::vec3 slip_of(const Window& window, const Path& path, const std::vector<glm::vec3>& positions) {
-    glm::vec3 slip(0);
-    for (const SurfacePoint& p : path.at) slip += p.velocity / float(path.at.size());
-    if (path.death > path.birth)
-        slip -= (positions.back() - positions.front()) / float(window.seconds[size_t(path.death)] - window.seconds[size_t(path.birth)]);
-    return slip;
+/// Velocity of the liquid past a track, which goes through these positions: its mean, and the straight line over the life that its changes
+/// from sample to sample are nearest to.
+void measure_slip(const Window& window, const Path& path, const std::vector<glm::vec3>& positions, TrackSamples& out) {
+    out.slip = out.slip_change = glm::vec3(0);
+    for (const SurfacePoint& p : path.at) out.slip += p.velocity / float(path.at.size());
+    if (path.death == path.birth) return;
+    const auto seconds = [&](int sample) { return float(window.seconds[size_t(sample)]); };
+    out.slip -= (positions.back() - positions.front()) / (seconds(path.death) - seconds(path.birth));
+    glm::vec3 changes(0);
+    float squares = 0;
+    for (size_t k = 0; k + 1 < path.at.size(); ++k) {
+        const int sample = path.birth + int(k);
+        const glm::vec3 point = (positions[k + 1] - positions[k]) / (seconds(sample + 1) - seconds(sample));
+        const float place = float(2 * k + 1) / float(path.at.size() - 1) - 1;
+        changes += place * (0.5f * (path.at[k].velocity + path.at[k + 1].velocity) - point), squares += place * place;
+    }
+    if (squares > 0) out.slip_change = changes / squares;
 }
 
 TrackSamples samples_of(const Window& window, const Path& path) {
@@ -323,7 +333,7 @@ TrackSamples samples_of(const Window& window, const Path& path) {
         const SurfacePoint p = path.target(s);
         samples.position.push_back(p.position), samples.normal.push_back(p.normal);
     }
-    samples.slip = slip_of(window, path, samples.position);
+    measure_slip(window, path, samples.position, samples);
     return samples;
 }
 
@@ -341,13 +351,14 @@ float slip_step_of(const Window& window) {
 /// any case, the same past coded as past true motion to .2°.
 void make_up_by_slip(const Window& window, CodedWindow& coded, const WindowGoal& goal, const format::BasisTables& tables) {
     constexpr double much = 0.35;  // of the mean speed, as slip's step
-    std::vector<glm::vec3> slips(window.paths.size());
+    std::vector<TrackSamples> slips(window.paths.size());
     double sum = 0, speeds = 0;
     for (size_t i = 0; i < slips.size(); ++i) {
         const Path& path = window.paths[i];
         const glm::vec3 normal = coded.decoded[i].normal[coded.decoded[i].normal.size() / 2];
-        slips[i] = slip_of(window, path, coded.decoded[i].position);
-        sum += double(path.at.size()) * glm::length(slips[i] - glm::dot(slips[i], normal) * normal);
+        measure_slip(window, path, coded.decoded[i].position, slips[i]);
+        const glm::vec3 slip = slips[i].slip;
+        sum += double(path.at.size()) * glm::length(slip - glm::dot(slip, normal) * normal);
         for (const SurfacePoint& p : path.at) speeds += glm::length(p.velocity);
     }
     if (!(sum > much * speeds)) return;

@@ -132,7 +132,7 @@ private:
         int32_t mean[window][3];         ///< step/16
         int16_t normal[window][3];       ///< of points, 1/16384
         uint32_t track[window];
-        uint8_t slip_rest[window];       ///< Σ |residuals| of slip, at most 255
+        uint8_t slip_rest[2][window];    ///< Σ |residuals| of slip and of its change, at most 255
         uint8_t rest[window][2][rest_terms][3];  ///< |residuals|, at most 255, [positions, normals][term][channel]
     };
 
@@ -183,7 +183,10 @@ private:
     Said said(const Near& moving, uint32_t k, uint32_t channel) const;
     Contexts series_contexts(const RawTrack& t, const Terms& terms, Said about, uint32_t k, uint32_t c, uint32_t others) const;
     bool term(const RawTrack& t, Terms& terms, uint32_t k, const int32_t* wanted, int32_t* out);
+    struct Sliding;
+    Sliding sliding_of(const RawTrack& t, const Near& near, bool change) const;
     bool slip(RawTrack& t, const Frame& frame, const RawTrack* source);
+    bool slip_values(const RawTrack& t, const Frame& frame, const Near& near, bool change, const RawTrack* source, int32_t (&out)[2]);
     bool series(RawTrack& t, const Frame& frame, bool second, const Near& moving, const RawTrack* source);
 
     Statistics& learned_;
@@ -196,7 +199,7 @@ private:
     uint32_t first_ = 0, done_ = 0, used_ = 0;
     bool drops_ = false;
     uint8_t rest_[2][rest_terms][3];  ///< of the track at hand
-    uint8_t slip_rest_ = 0;
+    uint8_t slip_rest_[2] = {0, 0};
     int64_t carried_[nearest][carried_terms][3];  ///< its motion as its neighbours' says, terms 1 …, in 1/256
     int64_t carried_share_[nearest];  ///< in 1/65536
     Recent recent_;

@@ -58,7 +58,7 @@ void ChunkModel<Coder>::remember(uint32_t index, const RawTrack& t, const Frame&
     recent_.birth[slot] = t.birth, recent_.death[slot] = t.death;
     recent_.track[slot] = index;
     std::memcpy(recent_.rest[slot], rest_, sizeof rest_);
-    recent_.slip_rest[slot] = slip_rest_;
+    for (int i = 0; i < 2; ++i) recent_.slip_rest[i][slot] = slip_rest_[i];
     if (recent_.count < window) ++recent_.count;
 }
 

@@ -12,7 +12,7 @@
 namespace rill::format {
 
 /// What is being coded by a signed value.
-enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, along, axis_delta, sliding, kinds };
+enum Kind : uint32_t { tangent, normal, turn, turn_axis, drop_path, drop_shape, along, axis_delta, sliding, slide_change, kinds };
 
 /// All that adapts while a chunk is coded.
 struct Statistics {

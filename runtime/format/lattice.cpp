@@ -24,6 +24,16 @@ void unfold(const int32_t axis[2], int32_t levels, int64_t out[3]) {
     out[0] = u, out[1] = v, out[2] = z;
 }
 
+/// Along t1, t2 → asset axes, in half steps. False: too large.
+bool place_slip(const int32_t (&along)[2], const Frame& frame, int8_t (&out)[3]) {
+    for (int c = 0; c < 3; ++c) {
+        const int64_t slip = rounded(2 * (int64_t(along[0]) * frame.row[0][c] + int64_t(along[1]) * frame.row[1][c]), one);
+        if (magnitude(slip) > 127) return false;
+        out[c] = int8_t(slip);
+    }
+    return true;
+}
+
 }  // namespace
 
 int64_t square_root(int64_t x) noexcept {
@@ -133,12 +143,7 @@ bool place_track(const RawTrack& raw, const LatticeSteps& steps, bool drop, Trac
     const bool drifts = drop && life == 1;  // how far a drop goes within a step need not be known as well as where it is
     for (uint32_t k = 1; k < raw.position_terms; ++k)
         if (!to_asset(raw.position[k], frame, drifts ? steps.ratio : ratio, drifts ? steps.ratio : 16, out + 3 * k)) return false;
-    for (int c = 0; c < 3 && !drop; ++c) {
-        const int64_t twice = 2 * (int64_t(raw.slip[0]) * frame.row[0][c] + int64_t(raw.slip[1]) * frame.row[1][c]);
-        const int64_t slip = rounded(twice, one);
-        if (magnitude(slip) > 127) return false;
-        track.slip[c] = int8_t(slip);
-    }
+    if (!drop && !(place_slip(raw.slip, frame, track.slip) && place_slip(raw.slip_change, frame, track.slip_change))) return false;
     out += 3 * raw.position_terms;
     if (drop) {
         for (uint32_t k = 0; k < raw.second_terms; ++k)

@@ -22,13 +22,14 @@ struct LatticeSteps {
     uint16_t ratio;  ///< tangential step / step, in 1/16: 16 … 1024
     float slip_step = 0;  ///< of slip, m/s; 0: points have none
     int32_t shape_unit = fine_shape_unit;
+    bool slip_changes = true;  ///< over the life of a point; not before version 8
     bool lone_drops_drift = true;  ///< drops of one sample have a second term of motion: how far they go in a step; not before version 7
 };
 /// Finite, positive, ratio in range; says nothing else of the values.
 bool valid(const LatticeSteps& steps) noexcept;
 inline LatticeSteps steps_of(const Header& h, const WindowRecord& w) noexcept {
     return {w.step, w.normal_step, {h.lower[0], h.lower[1], h.lower[2]}, w.ratio, w.slip_step, h.version < version_6 ? coarse_shape_unit : fine_shape_unit,
-            h.version >= version_7};
+            h.version >= version_8, h.version >= version_7};
 }
 
 /// Largest integer whose square is no more than x.
@@ -64,6 +65,7 @@ inline constexpr uint32_t slips_along_within = 2;
 inline constexpr int32_t max_symbol = 1 << 20;  ///< no stored integer is larger
 inline constexpr int32_t max_mean = 1 << 30;    ///< likewise mean positions, in step/16
 inline constexpr int32_t max_slip = 44;         ///< likewise slip: both at once fit Track::slip
+inline constexpr uint32_t least_changing_life = 6;  ///< samples; the slip of shorter lives stays as it is
 
 /// The integers of one track. Points: position [term][t1, t2, n] in frame_of(axis), term 0 relative to the
 /// lattice point; second [term][t1, t2, n], term 0 unused (the mean normal is the axis). Drops: position
@@ -75,7 +77,8 @@ struct RawTrack {
     int32_t axis[2];     ///< octahedral, |u|, |v| ≤ axis_levels
     int32_t position[max_terms][3];
     int32_t second[max_terms][6];
-    int32_t slip[2];     ///< of points, along t1, t2, in slip_step
+    int32_t slip[2];     ///< of points, along t1, t2, in slip_step, at the middle of the life
+    int32_t slip_change[2];  ///< likewise: from there to its end; 0 of lives shorter than least_changing_life
 };
 
 /// Levels of one octahedral half axis: neighbouring axes are about normal_step apart, scaled by the life.

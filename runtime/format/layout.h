@@ -21,7 +21,8 @@ enum Version : uint32_t {
     version_5 = 5,  ///< 2026-11: walls: the liquid is cut off at sides of its bounds
     version_6 = 6,  ///< 2026-11: shapes of drops on a lattice four times as fine
     version_7 = 7,  ///< 2026-11: drops of one sample tell where they go
-    current_version = version_7,
+    version_8 = 8,  ///< 2026-11: slip changes over a life
+    current_version = version_8,
 };
 
 /// Hard limits a valid file keeps; they bound what a hostile one can ask for.

@@ -4,7 +4,7 @@
 //
 // A *point track* is a surface point (position + unit normal) over part of a window.
 // Where the liquid is violent it follows the surface, and the liquid slides along under it: by its *slip*, a velocity along
-// the surface, the same over the track's life. Point and slip together move as the liquid does. Elsewhere slip is 0.
+// the surface, which goes as a straight line over the track's life. Point and slip together move as the liquid does. Elsewhere slip is 0.
 // A *drop track* is a small closed component: an ellipsoid (centre + symmetric shape matrix S),
 // surface = { centre + S u : |u| = 1 }. It costs one track where points would need a dozen. S is positive definite for a
 // drop of liquid, negative definite for a bubble: air that it takes out of the liquid around.
@@ -37,9 +37,17 @@ struct Track {
     uint8_t birth, death, flags;
     uint8_t position_terms;      ///< 1 … life length (2 of a drop of one sample); coefficients stored [term][channel]
     uint8_t second_terms;        ///< normal or shape; stored after the position's, [term][channel]
-    int8_t slip[3];              ///< of a point, in TrackBlock::slip_unit, asset axes
+    int8_t slip[3];              ///< of a point, in TrackBlock::slip_unit, asset axes: at the middle of its life
+    int8_t slip_change[3];       ///< likewise: by how much it is more at the end than at the middle; less at the beginning
 };
-static_assert(sizeof(Track) == 12);
+static_assert(sizeof(Track) == 16);
+
+/// Where a sample of a life stands between its beginning (−1) and its end (1). A life of one sample stands in the middle.
+inline float place_in_life(const Track& track, double s) {
+    if (track.birth >= track.death) return 0;
+    const double place = (2 * s - track.birth - track.death) / (track.death - track.birth);
+    return float(place < -1 ? -1 : place > 1 ? 1 : place);
+}
 
 /// Memory belongs to whoever made it; decoding fills it, evaluation reads it.
 struct TrackBlock {

@@ -114,8 +114,10 @@ uint32_t evaluate_tracks(const TimeRows* rows, const format::TrackBlock& block, 
         combine<3>(coefficients, row, track.position_terms, x);
         combine<3>(coefficients, row + rows->stride, track.position_terms, v);
         for (int c = 0; c < 3; ++c) x[c] += block.origin[c], v[c] *= rows->samples_per_second;
-        if (i < block.point_count)
-            for (int c = 0; c < 3; ++c) v[c] += block.slip_unit * float(track.slip[c]);
+        if (i < block.point_count && block.slip_unit > 0) {
+            const float place = format::place_in_life(track, rows->s);
+            for (int c = 0; c < 3; ++c) v[c] += block.slip_unit * (float(track.slip[c]) + place * float(track.slip_change[c]));
+        }
         bool sound = true;
         for (int c = 0; c < 3; ++c) sound = sound && std::isfinite(x[c]) && std::isfinite(v[c]);
         if (i < block.point_count) {

@@ -8,7 +8,7 @@ set -eu
 rill=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
 cd "$(dirname "$0")"
 input=../../content/drop_splash
-"$rill" cook $input -o v7.rill --frames 17:25 --window 4 --layers 3 --error 0.5e --jobs 1 --force --quiet || [ $? -eq 3 ]
-"$rill" info v7.rill --json >v7.info.json
-"$rill" verify v7.rill $input --frames 21 --json v7.verify.json >/dev/null 2>&1 || [ $? -eq 3 ]  # 3: an error target missed
-ls -l v7.*
+"$rill" cook $input -o v8.rill --frames 20:28 --window 8 --layers 3 --error 0.5e --jobs 1 --force --quiet || [ $? -eq 3 ]
+"$rill" info v8.rill --json >v8.info.json
+"$rill" verify v8.rill $input --frames 24 --json v8.verify.json >/dev/null 2>&1 || [ $? -eq 3 ]  # 3: an error target missed
+ls -l v8.*
