@@ -173,7 +173,7 @@ CookReport cook(const std::string& input, const std::string& output, const CookS
         report.target_met = true;
         return report;
     }
-    const WorkFolder folder(output, job.folder, settings.read.warn);
+    WorkFolder folder(output, job.folder, settings.read.warn);
     const uint32_t frames = job.plan.frames;
     const Survey survey = survey_input(*job.reader, settings.read, settings.survey, job.input_hash, settings.jobs,
                                        [&](uint32_t done) { progress({done, frames, "surveying"}); });

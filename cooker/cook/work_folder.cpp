@@ -64,13 +64,14 @@ WorkFolder::WorkFolder(const std::string& output, const std::string& path, std::
 
 WorkFolder::~WorkFolder() {
     std::error_code ignored;
-    fs::remove(path_, ignored);  // if it is empty
-    if (warn_ && fs::exists(path_, ignored)) warn_(path_ + ": keeps the finished spans; the same cook goes on from them");
+    if (!is_gone_) fs::remove(path_, ignored);  // if it is empty
+    if (!is_gone_ && warn_ && fs::exists(path_, ignored)) warn_(path_ + ": keeps the finished spans; the same cook goes on from them");
     unlock(lock_);
 }
 
-void WorkFolder::remove_all() const {
+void WorkFolder::remove_all() {
     std::error_code ignored;
+    is_gone_ = true;  // one of the same name is somebody else's from now on
     for (const fs::path& folder : work_folders(output_)) fs::remove_all(folder, ignored);
 }
 

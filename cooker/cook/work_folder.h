@@ -16,12 +16,13 @@ public:
     WorkFolder(const WorkFolder&) = delete;
     WorkFolder& operator=(const WorkFolder&) = delete;
     /// Also what earlier cooks of this output have left, of other input or settings.
-    void remove_all() const;
+    void remove_all();
 
 private:
     std::string output_, path_;
     std::function<void(const std::string&)> warn_;
     int lock_;  ///< an open folder, or -1
+    bool is_gone_ = false;
 };
 
 }  // namespace rill::cooker

@@ -310,13 +310,13 @@ void measure_slip(const Window& window, const Path& path, const std::vector<glm:
     out.slip = out.slip_change = glm::vec3(0);
     for (const SurfacePoint& p : path.at) out.slip += p.velocity / float(path.at.size());
     if (path.death == path.birth) return;
-    const auto seconds = [&](int sample) { return float(window.seconds[size_t(sample)]); };
-    out.slip -= (positions.back() - positions.front()) / (seconds(path.death) - seconds(path.birth));
+    const auto seconds = [&](int from, int to) { return float(window.seconds[size_t(to)] - window.seconds[size_t(from)]); };
+    out.slip -= (positions.back() - positions.front()) / seconds(path.birth, path.death);
     glm::vec3 changes(0);
     float squares = 0;
     for (size_t k = 0; k + 1 < path.at.size(); ++k) {
         const int sample = path.birth + int(k);
-        const glm::vec3 point = (positions[k + 1] - positions[k]) / (seconds(sample + 1) - seconds(sample));
+        const glm::vec3 point = (positions[k + 1] - positions[k]) / seconds(sample, sample + 1);
         const float place = float(2 * k + 1) / float(path.at.size() - 1) - 1;
         changes += place * (0.5f * (path.at[k].velocity + path.at[k + 1].velocity) - point), squares += place * place;
     }
