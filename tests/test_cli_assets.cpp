@@ -188,6 +188,35 @@ TEST_CASE("export: meshes that lie on the source, with normals and velocity") {
     for (const auto& entry : fs::directory_iterator(folder.path)) CHECK(entry.path().extension() != ".partial");
 }
 
+TEST_CASE("export leaves alone what it has not written, before it writes anything") {
+    for (const std::string ending : {".ply", ".obj", ".glb"}) {
+        CAPTURE(ending);
+        const TestFolder folder;
+        const std::string command = "export " + clip().asset + " -o " + (folder / "f%d") + ending + " --frames 3:4";
+        const std::string first = folder / "f3" + ending, second = folder / "f4" + ending;
+        put_file(second, "somebody's own");
+        const Result refused = run_rill(command);
+        CHECK(refused.code == 2);
+        CHECK(has(refused, "f4" + ending + ": is there already and no export of Rill's"));
+        CHECK(get_file(second) == "somebody's own");
+        CHECK(!fs::exists(first));
+        put_file(second, "");  // nothing is lost
+        CHECK(run_rill(command).code == 0);
+        const std::string written = get_file(second);
+        CHECK(run_rill(command).code == 0);  // its own, again
+        CHECK(get_file(second) == written);
+        CHECK(run_rill("export " + clip().asset + " -o " + second + " --time 0").code == 0);
+        CHECK(get_file(second) != written);
+    }
+    const TestFolder folder;
+    put_file(folder / "all.glb", "glTF of another");
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "all.glb")).code == 2);
+    CHECK(get_file(folder / "all.glb") == "glTF of another");
+    put_file(folder / "source.ply", plain_ply(Clip::frame(3)));
+    CHECK(run_rill("export " + clip().asset + " -o " + (folder / "source.ply") + " --time 0").code == 2);
+    CHECK(get_file(folder / "source.ply") == plain_ply(Clip::frame(3)));
+}
+
 TEST_CASE("bench: no allocation in frames, one output whatever the order and the workers") {
     const TestFolder folder;
     const Result result = run_rill("bench " + clip().asset + " --jobs 2 --json " + (folder / "b.json"));

@@ -72,6 +72,7 @@ int export_command(const ExportOptions& options) {
     if (options.at_time) {
         if (!(options.time >= 0 && options.time <= player.info().seconds))
             throw UsageError("--time lies outside 0 to " + std::to_string(player.info().seconds) + " seconds after the first frame");
+        check_frame_output(options.output);
         write_frame(options.output, player.mesh(options.time, options.cell, options.layers));
         return exit_done;
     }
@@ -80,6 +81,7 @@ int export_command(const ExportOptions& options) {
     if (animated && std::filesystem::path(options.output).extension() != ".glb")
         throw UsageError("-o '" + options.output + "' needs a place for the frame number, such as %04d; only .glb holds many frames in one file");
     number_pattern(options.output, 0);
+    for (const uint32_t frame : frames) check_frame_output(number_pattern(options.output, directory.frame_number(frame)));
     Progress progress("export", options.quiet);
     if (animated) {
         export_animation(player, frames, options, progress);

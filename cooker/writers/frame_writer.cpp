@@ -3,12 +3,18 @@
 
 #include <charconv>
 #include <cstdio>
+#include <fstream>
 
 #include "common/number_place.h"
 #include "common/output_file.h"
 
 namespace rill::cooker {
 namespace {
+
+// What tells our own files from others, near their beginnings. (Of GLB: its JSON's generator.)
+constexpr char ply_begins[] = "ply\nformat binary_little_endian 1.0\ncomment metres, metres per second\n", obj_begins[] = "# metres\n",
+               glb_says[] = R"("generator":"rill")";
+constexpr size_t looked_through = 1 << 20;  // bytes
 
 using Encode = std::string (*)(const Mesh&);
 Encode encoder_of(const std::filesystem::path& path) {
@@ -39,11 +45,23 @@ std::string number_pattern(const std::string& pattern, int number) {
 
 void check_frame_extension(const std::filesystem::path& path) { encoder_of(path); }
 
+void check_frame_output(const std::filesystem::path& path) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return;
+    std::string begins(looked_through, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(begins.data(), std::streamsize(begins.size()));
+    begins.resize(size_t(file.gcount()));
+    const bool is_ours = begins.starts_with(ply_begins) || begins.starts_with(obj_begins) ||
+                         (begins.starts_with("glTF") && begins.find(glb_says) != std::string::npos);
+    if (!begins.empty() && !is_ours)
+        throw InputError(path.string() + ": is there already and no export of Rill's, so it is not overwritten; delete it or choose another name");
+}
+
 void write_frame(const std::filesystem::path& path, const Mesh& mesh) { write_file(path, encoder_of(path)(mesh)); }
 
 std::string to_ply(const Mesh& mesh) {
-    std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment metres, metres per second\nelement vertex " +
-                        std::to_string(mesh.positions.size()) + "\nproperty float x\nproperty float y\nproperty float z\n";
+    std::string bytes = ply_begins + ("element vertex " + std::to_string(mesh.positions.size())) + "\nproperty float x\nproperty float y\nproperty float z\n";
     if (!mesh.normals.empty()) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
     if (!mesh.velocities.empty()) bytes += "property float vx\nproperty float vy\nproperty float vz\n";
     bytes += "element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
@@ -61,7 +79,7 @@ std::string to_ply(const Mesh& mesh) {
 }
 
 std::string to_obj(const Mesh& mesh) {
-    std::string text = "# metres\n";
+    std::string text = obj_begins;
     auto line = [&](const char* key, const glm::vec3& v) {
         text += key;
         for (int a = 0; a < 3; ++a) {

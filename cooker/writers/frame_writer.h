@@ -16,6 +16,9 @@ void write_frame(const std::filesystem::path& path, const Mesh& mesh);
 /// Throws UsageError unless write_frame() knows the extension.
 void check_frame_extension(const std::filesystem::path& path);
 
+/// Throws InputError where there is a file that write_frame(), or AnimatedGlb, has not written: source meshes must not be lost to a wrong folder.
+void check_frame_output(const std::filesystem::path& path);
+
 /// `frame_%04d.ply`, 7 → `frame_0007.ply`. Throws UsageError when there is more than one place for a number.
 std::string number_pattern(const std::string& pattern, int number);
 bool has_number_place(const std::string& pattern);
