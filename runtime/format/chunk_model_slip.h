@@ -50,7 +50,7 @@ bool ChunkModel<Coder>::slip_values(const RawTrack& t, const Frame& frame, const
         const Contexts context = {16 * (c ? 1 + (sum > 0) : 0) + expected, 7 * at_most(before, 6) + at_most(own, 6),
                                   5 * spread + at_most(length, 4), 6 * spread + at_most(before, 5)};
         int32_t wanted = given ? given[c] : 0;
-        if (source && source->flags & track_slips_along && magnitude(wanted - guess) <= slips_along_within)
+        if (!change && source && source->flags & track_slips_along && magnitude(wanted - guess) <= slips_along_within)
             wanted = guess < -max_slip ? -max_slip : guess > max_slip ? max_slip : guess;
         const int32_t delta = signed_value(change ? slide_change : sliding, context, wanted - guess);
         sum += magnitude(delta);

@@ -58,7 +58,7 @@ inline constexpr double position_gain = 0.75, normal_gain = 0.75;
 
 /// Only between coder and lattice: tangential steps equal the step (the normal turns far over the life).
 inline constexpr uint8_t track_fine = 8;
-/// Only of tracks to be encoded: their slip becomes what the neighbours foretell where that is no more than so many steps off
+/// Only of tracks to be encoded: their slip, but not its change, becomes what the neighbours foretell where that is no more than so many steps off
 /// along either axis, for it is the cheapest.
 inline constexpr uint8_t track_slips_along = 16;
 inline constexpr uint32_t slips_along_within = 2;
