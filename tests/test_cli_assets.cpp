@@ -45,6 +45,7 @@ TEST_CASE("assets that are none: 2, whatever the command") {
             CHECK(result.code == 2);
             CHECK(has(result, name));
         }
+    CHECK(has(run_rill("info " + (folder / "empty.rill")), "it is empty, as the parts of segments are"));
 }
 
 TEST_CASE("verify: meets its target, and says so in JSON and HTML") {

@@ -53,4 +53,15 @@ void spare_inputs(const fs::path& path, const std::vector<fs::path>& inputs) {
         if (fs::equivalent(path, input, error)) throw InputError(path.string() + ": is a file of the input, so it is not overwritten");
 }
 
+void spare_others(const fs::path& path, size_t most, const std::function<bool(std::string_view)>& is_ours, const char* what) {
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return;
+    std::string begins(most, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(begins.data(), std::streamsize(begins.size()));
+    begins.resize(size_t(file.gcount()));
+    if (!begins.empty() && !is_ours(begins))
+        throw InputError(path.string() + ": is there already and " + what + ", so it is not overwritten; delete it or choose another name");
+}
+
 }  // namespace rill::cooker

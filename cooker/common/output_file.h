@@ -2,6 +2,7 @@
 // Output appears only when it is complete: written beside its place, then renamed.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <string_view>
 #include <vector>
 
@@ -14,5 +15,9 @@ void write_file(const std::filesystem::path& path, std::string_view bytes);
 std::filesystem::path followed(const std::filesystem::path& path);
 /// Throws InputError where a file that is about to be written is one of those.
 void spare_inputs(const std::filesystem::path& path, const std::vector<std::filesystem::path>& inputs);
+
+/// Throws InputError where `path` is a file whose beginning, of at most so many bytes, is not ours; `what` it should be, in the message. An empty
+/// file is nobody's.
+void spare_others(const std::filesystem::path& path, size_t most, const std::function<bool(std::string_view)>& is_ours, const char* what);
 
 }  // namespace rill::cooker

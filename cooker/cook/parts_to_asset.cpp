@@ -4,14 +4,13 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
+#include "common/output_file.h"
 #include "cook/rate_search.h"
 #include "tracks/pipeline.h"
 
@@ -248,11 +247,8 @@ void check_output(const std::string& path) {
     if (std::filesystem::is_directory(path, error)) throw InputError(path + ": cannot be written: is a directory");
     if (!std::filesystem::exists(path, error)) return;
     if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": cannot be written: is no regular file");
-    std::array<char, sizeof format::magic> begins{};
-    std::ifstream file(path, std::ios::binary);
-    file.read(begins.data(), begins.size());
-    if (file.gcount() > 0 && std::memcmp(begins.data(), format::magic, size_t(file.gcount())) != 0)
-        throw InputError(path + ": is there already and no Rill asset, so it is not overwritten; delete it or choose another name");
+    const auto is_asset = [](std::string_view begins) { return std::memcmp(begins.data(), format::magic, begins.size()) == 0; };
+    spare_others(path, sizeof format::magic, is_asset, "no Rill asset");
 }
 
 Linked link_asset(const std::vector<std::string>& paths, const std::string& output) {

@@ -3,7 +3,6 @@
 
 #include <charconv>
 #include <cstdio>
-#include <fstream>
 
 #include "common/number_place.h"
 #include "common/output_file.h"
@@ -46,16 +45,11 @@ std::string number_pattern(const std::string& pattern, int number) {
 void check_frame_extension(const std::filesystem::path& path) { encoder_of(path); }
 
 void check_frame_output(const std::filesystem::path& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return;
-    std::string begins(looked_through, '\0');
-    std::ifstream file(path, std::ios::binary);
-    file.read(begins.data(), std::streamsize(begins.size()));
-    begins.resize(size_t(file.gcount()));
-    const bool is_ours = begins.starts_with(ply_begins) || begins.starts_with(obj_begins) ||
-                         (begins.starts_with("glTF") && begins.find(glb_says) != std::string::npos);
-    if (!begins.empty() && !is_ours)
-        throw InputError(path.string() + ": is there already and no export of Rill's, so it is not overwritten; delete it or choose another name");
+    const auto is_ours = [](std::string_view begins) {
+        return begins.starts_with(ply_begins) || begins.starts_with(obj_begins) ||
+               (begins.starts_with("glTF") && begins.find(glb_says) != std::string_view::npos);
+    };
+    spare_others(path, looked_through, is_ours, "no export of Rill's");
 }
 
 void write_frame(const std::filesystem::path& path, const Mesh& mesh) { write_file(path, encoder_of(path)(mesh)); }
